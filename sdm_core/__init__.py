@@ -1,0 +1,1 @@
+"""Exact stability of a rubbing blade: modal data and contact to delay equation to verdict."""

@@ -1,0 +1,134 @@
+"""The blade file, `rubscreen/blade/1` (JSON)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from sdm_core.blade.modal import Blade, ModalState
+from sdm_core.errors import DamagedFile, InvalidInput
+
+SCHEMA = "rubscreen/blade/1"
+EXAMPLES = ("nasa_rotor_37", "generic_compressor_blade")
+LARGEST_FILE_BYTES = 64 * 2**20
+
+_REQUIRED = ("name", "tip_nodes", "damping_ratio", "states")
+_OPTIONAL = ("direction", "design_speed_hz", "mass_kg", "tip_radius_m", "tip_z_m", "material")
+_STATE_REQUIRED = ("speed_hz", "frequency_hz", "mode_shape")
+_STATE_OPTIONAL = ("mode_shape_radial", "mode_shape_tangential")
+
+
+def blade_from_dict(data: Any) -> Blade:
+    """A blade from the parsed JSON of a blade file.
+
+    Keys the format does not know are ignored: the format grows by addition.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the field (``states[1].mode_shape[0]``), the value and the remedy.
+    """
+    if not isinstance(data, Mapping):
+        raise InvalidInput("blade", data, f"give an object with schema {SCHEMA!r}")
+    if data.get("schema") != SCHEMA:
+        raise InvalidInput("schema", data.get("schema", "missing"), f"give {SCHEMA!r}")
+    _require(data, _REQUIRED, "")
+    states = data["states"]
+    if not isinstance(states, list) or not states:
+        raise InvalidInput("states", states, "give a list of at least one modal state")
+    parsed = []
+    for i, state in enumerate(states):
+        if not isinstance(state, Mapping):
+            raise InvalidInput(f"states[{i}]", state, f"give an object with {', '.join(_STATE_REQUIRED)}")
+        _require(state, _STATE_REQUIRED, f"states[{i}].")
+        keys = _STATE_REQUIRED + _STATE_OPTIONAL
+        try:
+            parsed.append(ModalState(**{key: state.get(key) for key in keys}))
+        except InvalidInput as error:
+            raise error.under(f"states[{i}]") from None
+    optional = {key: data[key] for key in _OPTIONAL if data.get(key) is not None}
+    return Blade(data["name"], data["tip_nodes"], data["damping_ratio"], parsed, **optional)
+
+
+def blade_to_dict(blade: Blade) -> dict[str, Any]:
+    """The blade as the JSON of a blade file; `blade_from_dict` reads it back unchanged."""
+    states = []
+    for state in blade.states:
+        row: dict[str, Any] = {"speed_hz": state.speed_hz}
+        for key in ("frequency_hz", "mode_shape", *_STATE_OPTIONAL):
+            value = getattr(state, key)
+            if value is not None:
+                row[key] = value.tolist()
+        states.append(row)
+    out: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": blade.name,
+        "tip_nodes": list(blade.tip_nodes),
+        "direction": blade.direction,
+        "damping_ratio": blade.damping_ratio.tolist(),
+        "states": states,
+    }
+    for key in _OPTIONAL[1:]:
+        value = getattr(blade, key)
+        if value is not None:
+            out[key] = list(value) if isinstance(value, tuple) else value
+    return out
+
+
+def read_blade(path: str | Path) -> Blade:
+    """Read a blade file.
+
+    Raises
+    ------
+    InvalidInput
+        When there is no such file or its content cannot be used.
+    DamagedFile
+        When it is not whole JSON.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise InvalidInput("blade file", str(path), "give a file under 64 MiB")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput("blade file", str(path), f"give a readable file ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise DamagedFile("blade file", str(path), "it is not UTF-8 text; give a JSON blade file") from None
+    try:
+        data = json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise DamagedFile(
+            "blade file", str(path), f"it is not whole JSON ({error}); export it again"
+        ) from None
+    try:
+        return blade_from_dict(data)
+    except InvalidInput as error:
+        raise error.under(path.name + ":") from None
+
+
+def write_blade(blade: Blade, path: str | Path) -> None:
+    """Write a blade file."""
+    Path(path).write_text(json.dumps(blade_to_dict(blade), indent=1) + "\n", encoding="utf-8")
+
+
+def example_blade(name: str) -> Blade:
+    """One of the real blades shipped with the package (`EXAMPLES`).
+
+    Examples
+    --------
+    >>> example_blade("nasa_rotor_37").mode_count
+    5
+    """
+    if name not in EXAMPLES:
+        raise InvalidInput("example", name, f"name one of {', '.join(EXAMPLES)}")
+    source = resources.files("sdm_core.blade") / "examples" / f"{name}.json"
+    return blade_from_dict(json.loads(source.read_text(encoding="utf-8")))
+
+
+def _require(data: Mapping[str, Any], keys: tuple[str, ...], prefix: str) -> None:
+    for key in keys:
+        if data.get(key) is None:
+            raise InvalidInput(prefix + key, "missing", "the blade file needs it")

@@ -1,0 +1,305 @@
+"""A blade as its modal data at one or more rotor speeds, interpolated between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from sdm_core.blade.tracking import tracked
+from sdm_core.errors import InvalidInput, OutOfSpeedRange
+from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, SPEED_LIMITS_HZ, matrix, number, vector
+
+DIRECTIONS = ("casing_normal", "radial")
+
+
+@dataclass(frozen=True)
+class ModalState:
+    """Modes of the blade at one rotor speed.
+
+    Parameters
+    ----------
+    speed_hz
+        Rotor speed, Hz; 0 is at rest.
+    frequency_hz
+        Natural frequencies, Hz, shape (n,), in any order.
+    mode_shape
+        Mass-normalised amplitudes at the tip nodes in the contact direction, kg^-1/2, shape (n, r).
+    mode_shape_radial, mode_shape_tangential
+        The same in two further directions, where known.
+    """
+
+    speed_hz: float
+    frequency_hz: np.ndarray
+    mode_shape: np.ndarray
+    mode_shape_radial: np.ndarray | None = None
+    mode_shape_tangential: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        speed = number("speed_hz", self.speed_hz, 0.0, SPEED_LIMITS_HZ[1], "Hz")
+        frequency = vector("frequency_hz", self.frequency_hz, *FREQUENCY_LIMITS_HZ, "Hz")
+        shape = _shape("mode_shape", self.mode_shape, len(frequency), None)
+        object.__setattr__(self, "speed_hz", speed)
+        object.__setattr__(self, "frequency_hz", frequency)
+        object.__setattr__(self, "mode_shape", shape)
+        for name in ("mode_shape_radial", "mode_shape_tangential"):
+            if getattr(self, name) is not None:
+                checked = _shape(name, getattr(self, name), len(frequency), shape.shape[1])
+                object.__setattr__(self, name, checked)
+
+    def reordered(self, order: np.ndarray, sign: np.ndarray) -> ModalState:
+        """The same state with its modes in another order and with other signs."""
+
+        def turn(shape: np.ndarray | None) -> np.ndarray | None:
+            return None if shape is None else shape[order] * sign[:, None]
+
+        return ModalState(
+            self.speed_hz,
+            self.frequency_hz[order],
+            self.mode_shape[order] * sign[:, None],
+            turn(self.mode_shape_radial),
+            turn(self.mode_shape_tangential),
+        )
+
+
+@dataclass(frozen=True)
+class Blade:
+    """A blade's modal data, tracked from state to state ([SBL] 3.1 and 4.3).
+
+    Parameters
+    ----------
+    name
+        Free text.
+    tip_nodes
+        Names of the r tip nodes, leading to trailing edge.
+    damping_ratio
+        ξ, one number or one a mode, 0 ≤ ξ < 1.
+    states
+        One or more modal states; one means no centrifugal effect. Modes are followed from state
+        to state by shape and frequency and put in the order of the first state.
+    direction
+        Direction of the amplitudes: ``casing_normal`` or ``radial``.
+    design_speed_hz, mass_kg, tip_radius_m, tip_z_m, material
+        As in the blade file; optional.
+
+    Raises
+    ------
+    InvalidInput
+        For unusable data.
+    ModesNotTracked
+        When the modes of one state cannot be told among those of the next.
+
+    Examples
+    --------
+    >>> blade = Blade("b", ("LE",), 1e-3, [ModalState(0.0, [100.0, 400.0], [[1.0], [0.8]])])
+    >>> blade.at_speed(30.0).frequency_hz
+    array([100., 400.])
+    """
+
+    name: str
+    tip_nodes: tuple[str, ...]
+    damping_ratio: np.ndarray
+    states: tuple[ModalState, ...]
+    direction: str = "casing_normal"
+    design_speed_hz: float | None = None
+    mass_kg: float | None = None
+    tip_radius_m: tuple[float, ...] | None = None
+    tip_z_m: tuple[float, ...] | None = None
+    material: dict[str, Any] | None = field(default=None, hash=False)
+
+    def __init__(
+        self,
+        name: str,
+        tip_nodes: Sequence[str],
+        damping_ratio: float | Sequence[float] | np.ndarray,
+        states: Sequence[ModalState],
+        direction: str = "casing_normal",
+        design_speed_hz: float | None = None,
+        mass_kg: float | None = None,
+        tip_radius_m: Sequence[float] | None = None,
+        tip_z_m: Sequence[float] | None = None,
+        material: dict[str, Any] | None = None,
+    ) -> None:
+        put = object.__setattr__
+        if not isinstance(name, str) or not name:
+            raise InvalidInput("name", name, "give the blade a name")
+        put(self, "name", name)
+        put(self, "tip_nodes", _node_names(tip_nodes))
+        if direction not in DIRECTIONS:
+            raise InvalidInput("direction", direction, f"give one of {', '.join(DIRECTIONS)}")
+        put(self, "direction", direction)
+        put(self, "states", _ordered_states(states, len(self.tip_nodes)))
+        put(self, "damping_ratio", _damping(damping_ratio, self.mode_count))
+        put(self, "design_speed_hz", design_speed_hz)
+        if design_speed_hz is not None:
+            number("design_speed_hz", design_speed_hz, *SPEED_LIMITS_HZ, "Hz")
+        put(self, "mass_kg", mass_kg)
+        if mass_kg is not None:
+            number("mass_kg", mass_kg, 0.0, 1e6, "kg", open_low=True)
+        for key, values in (("tip_radius_m", tip_radius_m), ("tip_z_m", tip_z_m)):
+            put(self, key, None if values is None else tuple(vector(key, values, -1e3, 1e3, "m")))
+            if values is not None and len(values) != len(self.tip_nodes):
+                raise InvalidInput(
+                    key, f"{len(values)} numbers", f"give one a tip node: {len(self.tip_nodes)}"
+                )
+        put(self, "material", material)
+
+    @property
+    def mode_count(self) -> int:
+        """n."""
+        return len(self.states[0].frequency_hz)
+
+    @property
+    def first_frequency_hz(self) -> float:
+        """First frequency of the slowest state: the reference of `speed_ratio` ([SBL] 4)."""
+        return float(self.states[0].frequency_hz.min())
+
+    @property
+    def speed_range_hz(self) -> tuple[float, float] | None:
+        """Rotor speeds covered by the states, Hz; None (any) for a blade with one state."""
+        if len(self.states) == 1:
+            return None
+        return self.states[0].speed_hz, self.states[-1].speed_hz
+
+    @cached_property
+    def _interpolant(self) -> tuple[CubicSpline, CubicSpline]:
+        # Not-a-knot: linear through two states, a parabola in Ω² through three (DESIGN, fact 9).
+        x = np.array([s.speed_hz**2 for s in self.states])
+        squares = np.array([(2 * np.pi * s.frequency_hz) ** 2 for s in self.states])
+        shapes = np.array([s.mode_shape for s in self.states])
+        return CubicSpline(x, squares), CubicSpline(x, shapes)
+
+    def at_speeds(self, speed_hz: np.ndarray, *, extrapolate: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Natural angular frequencies and mode shapes at rotor speeds.
+
+        ω² and the mode shapes are interpolated in Ω².
+
+        Parameters
+        ----------
+        speed_hz
+            Hz, shape (m,).
+        extrapolate
+            Allow speeds outside the states' range.
+
+        Returns
+        -------
+        Λ in rad/s, shape (m, n); V_b in kg^-1/2, shape (m, n, r).
+
+        Raises
+        ------
+        OutOfSpeedRange
+            When a speed lies outside the range of the states and `extrapolate` is not set, or the
+            extrapolated ω² is not positive.
+        """
+        speed = np.atleast_1d(np.asarray(speed_hz, dtype=float))
+        if len(self.states) == 1:
+            state = self.states[0]
+            shape = np.broadcast_to(state.mode_shape, (len(speed), *state.mode_shape.shape))
+            omega = np.broadcast_to(2 * np.pi * state.frequency_hz, (len(speed), self.mode_count))
+            return omega, shape
+        low, high = self.states[0].speed_hz, self.states[-1].speed_hz
+        slack = 1e-9 * high  # a speed converted from rpm must not fall off the end by rounding
+        outside = (speed < low - slack) | (speed > high + slack)
+        if outside.any() and not extrapolate:
+            raise OutOfSpeedRange(
+                f"speed_hz[{int(np.argmax(outside))}]",
+                float(speed[outside][0]),
+                f"blade {self.name!r} has modal data from {low:g} to {high:g} Hz: "
+                "stay inside, add a state, or ask for extrapolation",
+            )
+        squares, shapes = self._interpolant
+        omega2 = squares(speed**2)
+        if (omega2 <= 0).any():
+            i = int(np.argmax((omega2 <= 0).any(axis=1)))
+            raise OutOfSpeedRange(
+                f"speed_hz[{i}]", float(speed[i]), "the extrapolated ω² is not positive: add a state there"
+            )
+        return np.sqrt(omega2), shapes(speed**2)
+
+    def at_speed(self, speed_hz: float, *, extrapolate: bool = False) -> ModalState:
+        """The modal state at one rotor speed (see `at_speeds`)."""
+        omega, shape = self.at_speeds(np.array([speed_hz]), extrapolate=extrapolate)
+        return ModalState(float(speed_hz), omega[0] / (2 * np.pi), shape[0])
+
+    def in_direction(self, direction: str) -> Blade:
+        """The blade with its amplitudes in another direction, where every state gives them.
+
+        ``radial`` reproduces [SBL], which keeps radial displacements only.
+        """
+        if direction == self.direction:
+            return self
+        if direction != "radial" or any(s.mode_shape_radial is None for s in self.states):
+            raise InvalidInput("direction", direction, "every state of the blade must give mode_shape_radial")
+        states = [replace(s, mode_shape=s.mode_shape_radial) for s in self.states]
+        return Blade(
+            self.name,
+            self.tip_nodes,
+            self.damping_ratio,
+            states,
+            direction,
+            self.design_speed_hz,
+            self.mass_kg,
+            self.tip_radius_m,
+            self.tip_z_m,
+            self.material,
+        )
+
+
+def _shape(name: str, values: Any, modes: int, nodes: int | None) -> np.ndarray:
+    shape = matrix(name, values, nodes, -AMPLITUDE_LIMIT, AMPLITUDE_LIMIT, "kg^-1/2")
+    if len(shape) != modes:
+        raise InvalidInput(name, f"{len(shape)} rows", f"give one row a mode: {modes}")
+    return shape
+
+
+def _node_names(names: Any) -> tuple[str, ...]:
+    if isinstance(names, str) or not hasattr(names, "__len__") or len(names) == 0:
+        raise InvalidInput("tip_nodes", names, "give a list of at least one node name")
+    for i, node in enumerate(names):
+        if not isinstance(node, str) or not node:
+            raise InvalidInput(f"tip_nodes[{i}]", node, "give a node name")
+        if node in names[:i]:
+            raise InvalidInput(f"tip_nodes[{i}]", node, "give every node a name of its own")
+    return tuple(names)
+
+
+def _damping(values: Any, modes: int) -> np.ndarray:
+    below_one = np.nextafter(1.0, 0.0)
+    if isinstance(values, int | float | np.number):
+        damping = np.full(modes, number("damping_ratio", values, 0.0, below_one, "(below 1)"))
+    else:
+        damping = vector("damping_ratio", values, 0.0, below_one, "(below 1)")
+        if len(damping) != modes:
+            raise InvalidInput(
+                "damping_ratio", f"{len(damping)} numbers", f"give one number, or one a mode: {modes}"
+            )
+    damping.setflags(write=False)
+    return damping
+
+
+def _ordered_states(states: Any, nodes: int) -> tuple[ModalState, ...]:
+    if not hasattr(states, "__len__") or len(states) == 0:
+        raise InvalidInput("states", "[]", "give at least one modal state")
+    modes = len(states[0].frequency_hz)
+    for i, state in enumerate(states):
+        if len(state.frequency_hz) != modes:
+            raise InvalidInput(
+                f"states[{i}].frequency_hz",
+                f"{len(state.frequency_hz)} modes",
+                f"give {modes}, as in states[0]",
+            )
+        if state.mode_shape.shape[1] != nodes:
+            raise InvalidInput(
+                f"states[{i}].mode_shape",
+                f"{state.mode_shape.shape[1]} columns",
+                f"give one a tip node: {nodes}",
+            )
+    in_order = sorted(states, key=lambda s: s.speed_hz)
+    for before, after in zip(in_order, in_order[1:], strict=False):
+        if after.speed_hz - before.speed_hz <= 1e-9 * after.speed_hz:
+            raise InvalidInput("states", f"two at {after.speed_hz:g} Hz", "give one state a rotor speed")
+    return tracked(in_order)

@@ -1,0 +1,157 @@
+"""The problem of this project: one blade, one contact, one rotor speed, one cutting stiffness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sdm_core.blade import Blade
+from sdm_core.contact import ContactConfiguration, Segment
+from sdm_core.delay_equation import DelayEquation, Engagement
+from sdm_core.errors import InvalidInput
+from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
+
+
+@dataclass(frozen=True)
+class RubbingBlade:
+    """ẍ + 2ξΛẋ + Λ²x = K_e γ(Ωt) G [x(t − τ) − x(t)], τ = 1/Ω ([SBL] Eq. 19 with γ added).
+
+    Attributes
+    ----------
+    omega
+        Λ, natural angular frequencies, rad/s, shape (n,).
+    damping_ratio
+        ξ, shape (n,).
+    contact_shape
+        W^½ V_bᵀ, kg^-1/2, shape (r, n); G = contact_shapeᵀ contact_shape.
+    speed_hz
+        Ω, Hz.
+    ke
+        K_e, N/m.
+    arcs
+        Arcs of engagement, or None for permanent contact.
+    segments
+        One revolution as stretches of constant γ.
+    """
+
+    omega: np.ndarray
+    damping_ratio: np.ndarray
+    contact_shape: np.ndarray
+    speed_hz: float
+    ke: float
+    arcs: tuple[tuple[float, float], ...] | None
+    segments: tuple[Segment, ...]
+
+    @classmethod
+    def from_blade(
+        cls,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: float,
+        ke: float,
+        *,
+        extrapolate: bool = False,
+    ) -> RubbingBlade:
+        """The problem at one rotor speed and cutting stiffness.
+
+        Raises
+        ------
+        InvalidInput
+            For a node the blade has not got, a speed or stiffness out of range.
+        OutOfSpeedRange
+            When the modal data do not reach `speed_hz`.
+        """
+        return cls.at_speeds(blade, contact, np.array([speed_hz]), extrapolate=extrapolate)[0].with_ke(ke)
+
+    @classmethod
+    def at_speeds(
+        cls,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: np.ndarray,
+        *,
+        extrapolate: bool = False,
+    ) -> list[RubbingBlade]:
+        """The problem at each of many rotor speeds, with K_e = 0."""
+        for i, speed in enumerate(speed_hz):
+            number(f"speed_hz[{i}]", speed, *SPEED_LIMITS_HZ, "Hz")
+        root = np.sqrt(contact.weight_vector(blade.tip_nodes))
+        omega, shape = blade.at_speeds(speed_hz, extrapolate=extrapolate)
+        arcs = None if contact.permanent else contact.arcs
+        segments = contact.segments if arcs else (Segment(1.0, True),)
+        return [
+            cls(w, blade.damping_ratio, root[:, None] * v.T, float(s), 0.0, arcs, segments)
+            for s, w, v in zip(speed_hz, omega, shape, strict=True)
+        ]
+
+    def with_ke(self, ke: float) -> RubbingBlade:
+        """The same at another cutting stiffness."""
+        return replace(self, ke=number("ke", ke, 0.0, KE_LIMIT, "N/m"))
+
+    @property
+    def permanent(self) -> bool:
+        """True when γ = 1 all round."""
+        return self.arcs is None
+
+    @property
+    def tau(self) -> float:
+        """Delay: one revolution, s."""
+        return 1.0 / self.speed_hz
+
+    @cached_property
+    def contact_matrix(self) -> np.ndarray:
+        """G, kg^-1, shape (n, n)."""
+        return self.contact_shape.T @ self.contact_shape
+
+    @cached_property
+    def contact_factor(self) -> np.ndarray:
+        """F of full column rank p with F Fᵀ = G, kg^-1/2, shape (n, p): what the tip feels."""
+        u, s, _ = np.linalg.svd(self.contact_shape.T, full_matrices=False)
+        keep = s > 1e-12 * s.max() if s.max() > 0 else np.zeros(len(s), dtype=bool)
+        return u[:, keep] * s[keep]
+
+    def delay_equation(self) -> DelayEquation:
+        """In state space zᵀ = (xᵀ ẋᵀ) ([SBL] Eqs. 5 and 20)."""
+        n = len(self.omega)
+        engagement = None if self.arcs is None else Engagement(self.arcs, self.tau)
+        return DelayEquation.of_second_order(
+            np.eye(n),
+            np.diag(2 * self.damping_ratio * self.omega),
+            np.diag(self.omega**2),
+            self.ke * self.contact_matrix,
+            self.tau,
+            engagement,
+        )
+
+
+def single_state_problem(
+    frequency_hz: np.ndarray,
+    damping_ratio: np.ndarray,
+    mode_shape: np.ndarray,
+    weights: np.ndarray,
+    speed_hz: float,
+    ke: float,
+    arcs: list[list[float]] | None = None,
+) -> RubbingBlade:
+    """A problem from bare arrays (frequencies (n,), damping (n,), mode shape (n, r), weights (r,)).
+
+    Raises
+    ------
+    InvalidInput
+        When the shapes disagree.
+    """
+    shape = np.asarray(mode_shape, dtype=float)
+    if shape.shape != (len(frequency_hz), len(weights)):
+        raise InvalidInput("mode_shape", f"shape {shape.shape}", "give one row a mode, one column a node")
+    contact = ContactConfiguration({"all": 1.0}, arcs)
+    return RubbingBlade(
+        2 * np.pi * np.asarray(frequency_hz, dtype=float),
+        np.asarray(damping_ratio, dtype=float),
+        np.sqrt(np.asarray(weights, dtype=float))[:, None] * shape.T,
+        float(speed_hz),
+        float(ke),
+        None if contact.permanent else contact.arcs,
+        contact.segments,
+    )

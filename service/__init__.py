@@ -1,0 +1,1 @@
+"""The screening service: REST, client, command line, charts."""

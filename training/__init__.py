@@ -1,0 +1,1 @@
+"""Surrogate of the exact core: sampling, labels, features, classifier, calibration, policy."""

@@ -1,0 +1,118 @@
+"""What screening answers: arrays by column, each entry with its source and its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SURROGATE, EXACT = "surrogate", "exact"
+CONFIDENT, NEAR_BOUNDARY = "confident", "near_boundary"
+OUT_OF_DOMAIN, REQUESTED = "out_of_domain", "requested"
+POLICIES = ("auto", "surrogate", "exact")
+
+
+@dataclass(frozen=True)
+class PointAnswers:
+    """Verdicts at m points (speed, K_e).
+
+    Attributes
+    ----------
+    stable
+        1.0 stable, 0.0 unstable, NaN not decided to tolerance; shape (m,).
+    unstable_probability
+        The surrogate's; NaN where the source is the exact core.
+    spectral_radius, growth_per_revolution, chatter_hz, error_estimate
+        The exact core's; NaN where the source is the surrogate.
+    source, reason
+        Arrays of str, shape (m,).
+    model, solver
+        Identifier of the surrogate (or None) and name of the exact method.
+    """
+
+    speed_hz: np.ndarray
+    ke: np.ndarray
+    stable: np.ndarray
+    unstable_probability: np.ndarray
+    spectral_radius: np.ndarray
+    growth_per_revolution: np.ndarray
+    chatter_hz: np.ndarray
+    error_estimate: np.ndarray
+    source: np.ndarray
+    reason: np.ndarray
+    model: str | None
+    solver: str
+
+    @property
+    def exact_share(self) -> float:
+        """Share of the answers that come from the exact core."""
+        return float(np.mean(self.source == EXACT))
+
+
+@dataclass(frozen=True)
+class BoundaryAnswers:
+    """First crossing at each of m speeds.
+
+    Attributes
+    ----------
+    critical_ke
+        N/m, NaN where there is none below `ke_max`; shape (m,).
+    chatter_hz
+        Frequency at the crossing, Hz; NaN where the surrogate answered or there is no crossing.
+    error_estimate
+        Relative error of `critical_ke`: the exact core's, or the surrogate's learned spread.
+    unstable_ke
+        For exact answers every interval of instability below `ke_max` as (low, high), N/m;
+        None where the surrogate answered.
+    """
+
+    speed_hz: np.ndarray
+    ke_max: float
+    critical_ke: np.ndarray
+    chatter_hz: np.ndarray
+    error_estimate: np.ndarray
+    unstable_ke: tuple[tuple[tuple[float, float], ...] | None, ...]
+    source: np.ndarray
+    reason: np.ndarray
+    model: str | None
+    solver: str
+
+    @property
+    def exact_share(self) -> float:
+        """Share of the answers that come from the exact core."""
+        return float(np.mean(self.source == EXACT))
+
+
+@dataclass(frozen=True)
+class MapAnswers:
+    """Verdicts on a grid of a speeds and b stiffnesses; two-dimensional arrays have shape (b, a).
+
+    Attributes
+    ----------
+    stable
+        1.0 stable, 0.0 unstable, NaN not decided.
+    unstable_probability
+        The surrogate's; NaN where the exact core answered.
+    source, reason
+        Arrays of str, shape (b, a).
+    """
+
+    speed_hz: np.ndarray
+    ke: np.ndarray
+    stable: np.ndarray
+    unstable_probability: np.ndarray
+    source: np.ndarray
+    reason: np.ndarray
+    model: str | None
+    solver: str
+
+    @property
+    def exact_share(self) -> float:
+        """Share of the answers that come from the exact core."""
+        return float(np.mean(self.source == EXACT))
+
+    @property
+    def unstable_share(self) -> float:
+        """Share of the map that is unstable, among the decided."""
+        decided = np.isfinite(self.stable)
+        return float(np.mean(self.stable[decided] == 0.0)) if decided.any() else float("nan")
