@@ -1,0 +1,293 @@
+"""The exact characteristic equation of a rubbing blade, permanent contact or arcs (DESIGN, fact 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm
+
+from sdm_core.rubbing_blade import RubbingBlade
+
+_LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
+_MOST_POINTS = 60_000
+
+
+class _Exponential:
+    """exp(A t) of many matrices at several t from one eigenvalue decomposition each.
+
+    Where eigenvectors are nearly parallel (two modes about to coalesce) scaling and squaring
+    takes over.
+    """
+
+    def __init__(self, a: np.ndarray) -> None:
+        self._a = a
+        self._rates, self._vectors = np.linalg.eig(a)
+        self._poor = np.ones(len(a), dtype=bool)
+        try:
+            self._inverse = np.linalg.inv(self._vectors)
+        except np.linalg.LinAlgError:
+            return
+        size = np.abs(self._inverse).sum(axis=1).max(axis=1) * np.abs(self._vectors).sum(axis=1).max(axis=1)
+        self._poor = ~(size < 1e6)
+
+    def over(self, t: float) -> np.ndarray:
+        """exp(A t), shape as A."""
+        if self._poor.all():
+            return expm(self._a * t)
+        out = (self._vectors * np.exp(self._rates * t)[:, None, :]) @ self._inverse
+        if self._poor.any():
+            out[self._poor] = expm(self._a[self._poor] * t)
+        return out
+
+
+@dataclass
+class CharacteristicEquation:
+    """det(I − M(μ)/μ) = 0, M(μ) the fundamental matrix over one revolution.
+
+    A Floquet solution has x(t − τ) = x(t)/μ, so the delayed force is K_e γ(t) G (1/μ − 1) x and
+    the multipliers are the eigenvalues of M(μ) that equal μ: on each arc the coefficients are
+    constant and M is a product of matrix exponentials. Nothing is discretized.
+
+    Attributes
+    ----------
+    problem
+        The rubbing blade.
+    evaluations
+        Fundamental matrices computed so far: the cost.
+    """
+
+    problem: RubbingBlade
+    evaluations: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        p = self.problem
+        n = len(p.omega)
+        # State (x, ẋ/ω) scaled so that free motion is a rotation: entries of M stay of order one.
+        rate = np.zeros((2 * n, 2 * n))
+        rate[:n, n:] = np.diag(p.omega)
+        rate[n:, :n] = -np.diag(p.omega)
+        rate[n:, n:] = -np.diag(2 * p.damping_ratio * p.omega)
+        self._free = rate * p.tau
+        contact = np.zeros_like(rate)
+        contact[n:, :n] = p.ke * p.contact_matrix / p.omega[:, None]
+        self._contact = contact * p.tau
+        self._flights = {s.length: expm(self._free * s.length) for s in p.segments if not s.engaged}
+
+    @property
+    def size(self) -> int:
+        """2n."""
+        return len(self._free)
+
+    def fundamental(self, mu: np.ndarray) -> np.ndarray:
+        """M(μ), shape (m, 2n, 2n)."""
+        mu = np.atleast_1d(np.asarray(mu, dtype=complex))
+        self.evaluations += len(mu)
+        engaged = self._free + (1 / mu - 1)[:, None, None] * self._contact
+        out = np.broadcast_to(np.eye(self.size), engaged.shape)
+        with np.errstate(all="ignore"):  # near μ = 0, an essential singularity
+            grow = _Exponential(engaged)
+            for segment in self.problem.segments:
+                step = grow.over(segment.length) if segment.engaged else self._flights[segment.length]
+                out = step @ out
+        return out
+
+    def value(self, mu: np.ndarray) -> np.ndarray:
+        """det(I − M(μ)/μ), shape (m,)."""
+        mu = np.atleast_1d(np.asarray(mu, dtype=complex))
+        with np.errstate(all="ignore"):
+            if self.problem.permanent:  # det(I − exp(L)/μ) = Π(1 − exp(l)/μ), l the eigenvalues of L
+                growth = np.exp(self._permanent_rates(mu))
+                return (1 - growth / mu[:, None]).prod(axis=1)
+            return np.linalg.det(np.eye(self.size) - self.fundamental(mu) / mu[:, None, None])
+
+    def _permanent_rates(self, mu: np.ndarray) -> np.ndarray:
+        self.evaluations += len(mu)
+        return np.linalg.eigvals(self._free + (1 / mu - 1)[:, None, None] * self._contact)
+
+    def _candidates(self, mu: np.ndarray) -> np.ndarray:
+        """Eigenvalues of M(μ), shape (m, 2n); rows that overflow are zero."""
+        with np.errstate(all="ignore"):
+            if self.problem.permanent:
+                nu = np.exp(self._permanent_rates(mu))
+            else:
+                matrices = self.fundamental(mu)
+                matrices[~np.isfinite(matrices).all(axis=(1, 2))] = 0.0
+                nu = np.linalg.eigvals(matrices)
+        return np.where(np.isfinite(nu), nu, 0.0)
+
+    def count_outside(self, radius: float = 1.0) -> int | None:
+        """Multipliers with modulus above `radius`, or None when one lies on the circle to rounding.
+
+        det(μI − M(μ)) has 2n zeros' worth of growth at infinity and an essential singularity at 0,
+        so zeros are counted from outside: their number is minus the winding number of
+        det(I − M(μ)/μ) round the circle. Conjugate symmetry leaves half of it. Points are added
+        until the phase turns by less than 0.8 rad between neighbours, then at every middle
+        once more, to see that no turn was hidden.
+        """
+        angle, value = self._on_circle(radius)
+        if angle is None or value is None:
+            return None
+        turns = np.angle(value[1:] / value[:-1]).sum() / np.pi
+        count = -round(turns)
+        return count if abs(turns + count) < 1e-3 and count >= 0 else None
+
+    def crossing_near(self, radius: float = 1.0) -> complex:
+        """Point of the circle nearest to a multiplier, as the determinant shows it."""
+        angle, value = self._on_circle(radius)
+        if angle is None or value is None:
+            angle = np.linspace(0.0, np.pi, 4 * self._first_points(radius))
+            value = self.value(radius * np.exp(1j * angle))
+        return complex(radius * np.exp(1j * angle[np.argmin(np.abs(value))]))
+
+    def _on_circle(self, radius: float) -> tuple[np.ndarray | None, np.ndarray | None]:
+        angle = np.linspace(0.0, np.pi, self._first_points(radius))
+        value = self.value(radius * np.exp(1j * angle))
+        checked = np.zeros(len(angle) - 1, dtype=bool)
+        while True:
+            if not np.isfinite(value).all() or (value == 0).any():
+                return None, None
+            step = np.abs(np.angle(value[1:] / value[:-1]))
+            coarse = np.flatnonzero((step > _LARGEST_STEP) | ~checked)
+            if len(coarse) == 0:
+                return angle, value
+            if len(angle) + len(coarse) > _MOST_POINTS:
+                return None, None
+            if (angle[coarse + 1] - angle[coarse]).min() < 1e-13:
+                return None, None
+            middle = 0.5 * (angle[coarse] + angle[coarse + 1])
+            new = self.value(radius * np.exp(1j * middle))
+            hidden = np.angle(new / value[coarse]) + np.angle(value[coarse + 1] / new)
+            hidden -= np.angle(value[coarse + 1] / value[coarse])
+            fine = (np.abs(hidden) < 1.0) & (step[coarse] <= _LARGEST_STEP)
+            checked[coarse] = fine
+            checked = np.insert(checked, coarse + 1, fine)
+            angle = np.insert(angle, coarse + 1, middle)
+            value = np.insert(value, coarse + 1, new)
+
+    def _first_points(self, radius: float) -> int:
+        # Contact shifts the phase of mode j over a revolution by about K_e G_jj τ |1/μ − 1|/(2ω_j).
+        p = self.problem
+        shift = p.ke * p.contact_matrix.diagonal() / (2 * p.omega) * p.tau * (1 + 1 / radius)
+        return 33 + min(2000, int(4 * shift.sum()))
+
+    def dominant(self, unstable: int | None = None) -> tuple[complex, float]:
+        """Multiplier of largest modulus (upper half-plane) and the relative error of its modulus.
+
+        Candidates are eigenvalues ν of M(μ) on a circle whose argument is near that of μ; Newton's
+        method makes them exact, and the argument principle proves that none lies outside the
+        largest. Where one does, the next circle lies between the largest found and the
+        smallest radius known to hold all.
+
+        Parameters
+        ----------
+        unstable
+            `count_outside(1.0)`, where already known.
+
+        Returns
+        -------
+        The multiplier, and an infinite error where the proof did not succeed.
+        """
+        unstable = self.count_outside(1.0) if unstable is None else unstable
+        low, high = 0.0, 1.0 if unstable == 0 else np.inf
+        radius, best = 1.0, 0j
+        for _ in range(16):
+            for starts in self._starts(radius):
+                best = max([best, *self._newton(starts)], key=abs)
+                low = abs(best)
+                outside = self.count_outside(low * (1 + 1e-7)) if low > 0 else -1
+                if outside == 0:
+                    return complex(best.real, abs(best.imag)), self._newton_step(best)
+                if outside is None:
+                    return complex(best.real, abs(best.imag)), np.inf
+            if np.isinf(high):
+                radius = 2.0 * max(radius, low)
+                high = radius if self.count_outside(radius) == 0 else high
+            elif low <= 0.01 * radius:
+                radius *= 0.6
+                continue
+            radius = np.sqrt(low * high) if np.isfinite(high) else radius
+            if np.isfinite(high) and self.count_outside(radius) == 0:
+                high = radius
+                radius = np.sqrt(low * high)
+        return complex(best.real, abs(best.imag)), np.inf
+
+    def chatter_hz(self, mu: complex) -> float:
+        """Frequency of the largest Fourier component of the contact displacement, Hz.
+
+        The Floquet solution of multiplier μ is e^{(ln μ/τ)t} times a τ-periodic function; its
+        components lie at |arg μ/2π + k|Ω (DESIGN, section 1).
+        """
+        p, n = self.problem, len(self.problem.omega)
+        if p.contact_factor.shape[1] == 0:  # no mode moves the contact nodes
+            return float("nan")
+        nu, vectors = np.linalg.eig(self.fundamental(np.array([mu]))[0])
+        state = vectors[:, np.argmin(np.abs(nu - mu))]
+        # Enough equal samples of a revolution for the fastest oscillation there can be.
+        fastest = np.sqrt(p.omega.max() ** 2 + 2 * p.ke * np.trace(p.contact_matrix))
+        samples = 64 * int(np.ceil(max(8.0, fastest * p.tau / 8)))
+        engaged = self._free + (1 / mu - 1) * self._contact
+        edges = np.cumsum([0.0, *(s.length for s in p.segments)])
+        t = np.arange(samples) / samples
+        motion = np.empty((samples, p.contact_factor.shape[1]), dtype=complex)
+        for segment, start, end in zip(p.segments, edges[:-1], edges[1:], strict=True):
+            inside = (t >= start - 1e-12) & (t < end - 1e-12)
+            rates, modes = np.linalg.eig(engaged if segment.engaged else self._free.astype(complex))
+            amplitude = np.linalg.solve(modes, state)
+            history = modes[:n] @ (amplitude[:, None] * np.exp(rates[:, None] * (t[inside] - start)))
+            motion[inside] = history.T @ p.contact_factor
+            state = modes @ (amplitude * np.exp(rates * segment.length))
+        periodic = motion * np.exp(-np.log(mu) * t)[:, None]
+        spectrum = (np.abs(np.fft.fft(periodic, axis=0)) ** 2).sum(axis=1)
+        k = np.fft.fftfreq(samples, 1 / samples)[np.argmax(spectrum)]
+        return float(abs(np.angle(mu) / (2 * np.pi) + k) * p.speed_hz)
+
+    def _starts(self, radius: float) -> list[np.ndarray]:
+        """Starting points for Newton's method in batches, the most promising first."""
+        angle = np.linspace(0.0, np.pi, 2 * self._first_points(radius) + 1)
+        mu = radius * np.exp(1j * angle)
+        nu = self._candidates(mu)
+        # Branches need no tracking: an eigenvalue whose argument is near that of μ is nearly a root.
+        offset = np.abs(np.angle(nu / mu[:, None]))
+        rows, columns = np.nonzero((offset < 0.3) & (np.abs(nu) > 1e-12))
+        found, offset = nu[rows, columns], offset[rows, columns]
+        found = found[np.argsort(offset - np.log(np.abs(found)))]
+        apart: list[complex] = []
+        for start in found:
+            if all(abs(start - other) > 0.05 * abs(other) for other in apart):
+                apart.append(start)
+            if len(apart) == 40:
+                break
+        starts = np.array(apart, dtype=complex)
+        starts *= np.clip(np.abs(starts), 0.5 * radius, 2 * radius) / np.abs(starts)
+        return [starts[i : i + 8] for i in range(0, len(starts), 8)]
+
+    def _newton(self, start: np.ndarray) -> np.ndarray:
+        """Roots reached from the starts, by Newton's method on log μ with a numerical slope."""
+        x = np.log(start)
+        alive = np.ones(len(x), dtype=bool)
+        h = 1e-6
+        step = np.full(len(x), np.inf, dtype=complex)
+        for _ in range(25):
+            go = np.flatnonzero(alive & (np.abs(step) > 1e-13))
+            if len(go) == 0:
+                break
+            f = self.value(np.exp(x[go]))
+            with np.errstate(all="ignore"):
+                slope = (self.value(np.exp(x[go] + h)) - self.value(np.exp(x[go] - h))) / (2 * h)
+                move = np.where(slope != 0, -f / slope, np.inf)
+            alive[go] &= np.isfinite(move)
+            move[~np.isfinite(move)] = 0.0
+            move *= np.minimum(1.0, 0.3 / np.maximum(np.abs(move), 1e-300))
+            step[go] = move
+            x[go] = x[go] + move
+            alive &= (x.real > -60) & (x.real < 60)
+        done = alive & (np.abs(step) < 1e-9)
+        return np.exp(x[done])
+
+    def _newton_step(self, mu: complex) -> float:
+        """Size of one more Newton step on log μ: what is left of the error."""
+        h = 1e-6
+        value = self.value(np.array([mu, mu * np.exp(h), mu * np.exp(-h)]))
+        slope = (value[1] - value[2]) / (2 * h)
+        return float(abs(value[0] / slope)) + 1e-14 if slope != 0 else np.inf
