@@ -67,7 +67,7 @@ class ContactConfiguration:
     @classmethod
     def at(cls, *nodes: str, arcs: Sequence[Sequence[float]] | None = None) -> ContactConfiguration:
         """Unit weight on each of the named nodes."""
-        return cls({node: 1.0 for node in nodes}, arcs)
+        return cls(dict.fromkeys(nodes, 1.0), arcs)
 
     @property
     def permanent(self) -> bool:

@@ -47,10 +47,17 @@ class DamagedFile(InvalidInput):
     """A file is truncated, corrupt or of another kind."""
 
 
+class TooMuchWork(InvalidInput):
+    """More exact work than one call may ask for."""
+
+
 class Cancelled(RubscreenError):
     """The caller asked for the work to stop."""
 
 
 def _short(value: Any) -> str:
-    text = value if isinstance(value, str) else repr(value)
+    try:
+        text = value if isinstance(value, str) and value else repr(value)
+    except ValueError:  # an integer with more digits than Python prints
+        text = f"a {type(value).__name__} too large to print"
     return text if len(text) <= 120 else f"{text[:100]}... ({len(text)} characters)"

@@ -136,7 +136,11 @@ def _first_grid(receptance: ContactReceptance, ke_max: float) -> np.ndarray:
     grid = [np.array([low, high]), np.geomspace(low, high, 24)]
     for centre, damping in zip(omega, receptance.damping_ratio[touched], strict=True):
         width = max(damping, 1e-7)
-        offset = centre * width * np.r_[0.0, np.geomspace(0.5, max(1.0, 1.0 / width), 2 + int(3 * np.log(1 / width)))]
+        offset = (
+            centre
+            * width
+            * np.r_[0.0, np.geomspace(0.5, max(1.0, 1.0 / width), 2 + int(3 * np.log(1 / width)))]
+        )
         grid += [centre + offset, centre - offset]
     w = np.unique(np.concatenate(grid))
     w = w[(w >= low) & (w <= high)]

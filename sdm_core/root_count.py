@@ -66,7 +66,11 @@ def _frequencies(receptance: ContactReceptance, tau: float, ke: float) -> np.nda
     grid = [np.linspace(0.0, high, max(64, int(6 * high * tau / (2 * np.pi))))]
     for centre, damping in zip(omega, receptance.damping_ratio, strict=True):
         width = max(damping, 1e-8)
-        offset = centre * width * np.r_[0.0, np.geomspace(0.25, max(1.0, 0.5 / width), 2 + int(4 * np.log(1 / width)))]
+        offset = (
+            centre
+            * width
+            * np.r_[0.0, np.geomspace(0.25, max(1.0, 0.5 / width), 2 + int(4 * np.log(1 / width)))]
+        )
         grid += [centre + offset, np.maximum(centre - offset, 0.0)]
     return np.unique(np.concatenate(grid))
 

@@ -1,16 +1,75 @@
-"""The one function that decides: surrogate or exact core."""
+"""The one place that decides: surrogate or exact core.
+
+REST routes, command line, batch jobs and the evaluation of a model all come through here, so that
+what is certified is what is served.
+"""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 
 from sdm_core.blade import Blade
+from sdm_core.boundary import CHARACTERISTIC, CLOSED_FORM, boundary, verdicts
 from sdm_core.contact import ContactConfiguration
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from sdm_core.errors import InvalidInput, TooMuchWork
+from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.stability import stability
+from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
+from training.answers import (
+    CONFIDENT,
+    EXACT,
+    NEAR_BOUNDARY,
+    OUT_OF_DOMAIN,
+    POLICIES,
+    REQUESTED,
+    SURROGATE,
+    BoundaryAnswers,
+    MapAnswers,
+    PointAnswers,
+)
+from training.calibration import VerificationBand
+from training.cases import CaseBatch
+from training.registry import SHIPPED, Model, load_model
+from training.surrogate import PredictedBoundary
+
+# A boundary is answered by the surrogate where its band is narrower than this in log10 K_e (5 %).
+_SURE_BOUNDARY = float(np.log10(1.05))
+# Seconds of exact work, from measured costs on one core of a small machine.
+_POINT_S, _ARC_VERDICT_S, _ARC_BOUNDARY_S = 0.04, 0.008, 1.2
 
 
 class Screener:
-    """Answers stability questions from the surrogate where it is sure, else from the exact core."""
+    """Answers from the surrogate where it is sure, else from the exact core.
+
+    Parameters
+    ----------
+    model
+        None answers exactly only.
+    exact_budget_s
+        Most exact work one call may ask for, seconds as estimated before it starts.
+    """
+
+    def __init__(self, model: Model | None, exact_budget_s: float = 240.0) -> None:
+        self.model = model
+        self.exact_budget_s = exact_budget_s
+
+    @classmethod
+    def default(cls, models_folder: Path = SHIPPED, model_id: str | None = None) -> Screener:
+        """With the active model of a folder, by default the shipped one.
+
+        Raises
+        ------
+        InvalidInput, DamagedFile
+            As `load_model`.
+        """
+        return cls(load_model(model_id, models_folder))
+
+    @property
+    def model_id(self) -> str | None:
+        """Identifier of the model in use."""
+        return self.model.id if self.model else None
 
     def points(
         self,
@@ -19,7 +78,58 @@ class Screener:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
-    ) -> PointAnswers: ...
+    ) -> PointAnswers:
+        """Verdicts at points (speed_hz[i], ke[i]).
+
+        Exact answers also give spectral radius, growth, chatter frequency and error estimate.
+
+        Raises
+        ------
+        InvalidInput
+            For unusable input, or `policy` "surrogate" outside the domain.
+        TooMuchWork
+            When the exact core would have to answer too many points.
+        """
+        speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
+        if len(speed) != len(stiffness):
+            raise InvalidInput("ke", f"{len(stiffness)} numbers", f"give one a speed: {len(speed)}")
+        predicted, reason = self._predicted(blade, contact, speed, policy)
+        if predicted is None:
+            probability, stable = np.full(len(speed), np.nan), np.full(len(speed), np.nan)
+        else:
+            probability = predicted.unstable_probability(stiffness)
+            stable = (probability < 0.5).astype(float)
+            if policy == "auto":
+                near = self._band.verify(predicted, stiffness)
+                reason[(reason == CONFIDENT) & near] = NEAR_BOUNDARY
+        exact = self._exact_rows(reason, policy)
+        self._allow(exact.sum(), _POINT_S, "speed_hz")
+        columns = np.full((4, len(speed)), np.nan)
+        probability[exact], stable[exact] = np.nan, np.nan
+        for i in np.flatnonzero(exact):
+            found = stability(RubbingBlade.from_blade(blade, contact, speed[i], stiffness[i]))
+            stable[i] = np.nan if found.stable is None else float(found.stable)
+            columns[:, i] = (
+                found.spectral_radius,
+                found.growth_per_revolution,
+                found.chatter_hz,
+                found.error_estimate,
+            )
+        radius, growth, chatter, error = columns
+        return PointAnswers(
+            speed,
+            stiffness,
+            stable,
+            probability,
+            radius,
+            growth,
+            chatter,
+            error,
+            _source(exact),
+            reason,
+            self.model_id,
+            CHARACTERISTIC,
+        )
 
     def boundary(
         self,
@@ -28,7 +138,44 @@ class Screener:
         speed_hz: np.ndarray,
         ke_max: float,
         policy: str = "auto",
-    ) -> BoundaryAnswers: ...
+    ) -> BoundaryAnswers:
+        """First crossing at each speed; raises as `points`."""
+        speed = speeds("speed_hz", speed_hz)
+        ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+        predicted, reason = self._predicted(blade, contact, speed, policy)
+        critical, chatter, error = (np.full(len(speed), np.nan) for _ in range(3))
+        if predicted is not None:
+            with np.errstate(over="ignore"):
+                critical = np.where(predicted.log_ke <= np.log10(ke_max), 10.0**predicted.log_ke, np.nan)
+            width = self._band.half_width(predicted)
+            error = 10.0 ** (self._band.spreads * predicted.spread) - 1
+            if policy == "auto":
+                doubtful = width > _SURE_BOUNDARY
+                doubtful &= predicted.log_ke - width < np.log10(ke_max)  # else none below, for sure
+                doubtful |= np.abs(predicted.log_ke - np.log10(ke_max)) < width
+                reason[(reason == CONFIDENT) & doubtful] = NEAR_BOUNDARY
+        exact = self._exact_rows(reason, policy)
+        unstable: list[tuple[tuple[float, float], ...] | None] = [None] * len(speed)
+        if exact.any():
+            if not contact.permanent:
+                self._allow(exact.sum(), _ARC_BOUNDARY_S, "speed_hz")
+            found = boundary(blade, contact, speed[exact], ke_max)
+            critical[exact], chatter[exact] = found.critical_ke, found.chatter_hz
+            error[exact] = found.error_estimate
+            for i, intervals in zip(np.flatnonzero(exact), found.unstable_ke, strict=True):
+                unstable[i] = intervals
+        return BoundaryAnswers(
+            speed,
+            ke_max,
+            critical,
+            chatter,
+            error,
+            tuple(unstable),
+            _source(exact),
+            reason,
+            self.model_id,
+            _solver(contact),
+        )
 
     def map(
         self,
@@ -37,4 +184,89 @@ class Screener:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
-    ) -> MapAnswers: ...
+    ) -> MapAnswers:
+        """Verdicts on the grid of speeds (a,) and stiffnesses (b,); raises as `points`."""
+        speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
+        predicted, reason_of_speed = self._predicted(blade, contact, speed, policy)
+        shape = (len(stiffness), len(speed))
+        reason = np.broadcast_to(reason_of_speed, shape).copy()
+        if predicted is None:
+            probability, stable = np.full(shape, np.nan), np.full(shape, np.nan)
+        else:
+            column = stiffness[:, None]
+            probability = predicted.unstable_probability(column)
+            stable = (probability < 0.5).astype(float)
+            if policy == "auto":
+                reason[(reason == CONFIDENT) & self._band.verify(predicted, column)] = NEAR_BOUNDARY
+        exact = self._exact_rows(reason, policy)
+        if not contact.permanent:
+            self._allow(exact.sum(), _ARC_VERDICT_S, "speed_hz")
+        if exact.any():
+            row, col = np.nonzero(exact)
+            stable[exact] = verdicts(blade, contact, speed[col], stiffness[row])
+            probability[exact] = np.nan
+        return MapAnswers(
+            speed,
+            stiffness,
+            stable,
+            probability,
+            _source(exact),
+            reason,
+            self.model_id,
+            _solver(contact),
+        )
+
+    @property
+    def _band(self) -> VerificationBand:
+        assert self.model is not None
+        return self.model.band
+
+    def _predicted(
+        self, blade: Blade, contact: ContactConfiguration, speed: np.ndarray, policy: str
+    ) -> tuple[PredictedBoundary | None, np.ndarray]:
+        """The surrogate's boundary (None where it is not to be asked) and the reason so far."""
+        if policy not in POLICIES:
+            raise InvalidInput("policy", policy, f"give one of {', '.join(POLICIES)}")
+        reason = np.full(len(speed), REQUESTED, dtype="<U13")
+        if policy == "exact":
+            contact.weight_vector(blade.tip_nodes)
+            return None, reason
+        if self.model is None:
+            raise InvalidInput("policy", policy, "no model is loaded: use policy exact, or train one")
+        cases = CaseBatch.from_blade(blade, contact, speed)
+        why = self.model.design_space.first_violation(cases)
+        if not contact.permanent:
+            why[why == ""] = "arcs of contact, which this model does not cover"
+        outside = why != ""
+        if policy == "surrogate" and outside.any():
+            i = int(np.argmax(outside))
+            remedy = "the surrogate does not answer outside its domain; use policy auto or exact"
+            raise InvalidInput("policy", policy, f"speed_hz[{i}] = {speed[i]:g} Hz: {why[i]}; {remedy}")
+        if policy == "auto":
+            reason[:] = np.where(outside, OUT_OF_DOMAIN, CONFIDENT)
+        if outside.all():
+            return None, reason
+        predicted = self.model.surrogate.boundary(cases[~outside])
+        log_ke, spread = np.full(len(speed), np.nan), np.full(len(speed), np.nan)
+        log_ke[~outside], spread[~outside] = predicted.log_ke, predicted.spread
+        return PredictedBoundary(log_ke, spread), reason
+
+    def _exact_rows(self, reason: np.ndarray, policy: str) -> np.ndarray:
+        if policy == "surrogate":
+            return np.zeros(reason.shape, dtype=bool)
+        return reason != CONFIDENT
+
+    def _allow(self, count: int, unit_s: float, field: str) -> None:
+        most = int(self.exact_budget_s / unit_s)
+        if count > most:
+            raise TooMuchWork(
+                field, f"{count} answers by the exact core", f"ask for at most {most} of them in one call"
+            )
+
+
+def _source(exact: np.ndarray) -> np.ndarray:
+    return np.where(exact, EXACT, SURROGATE)
+
+
+def _solver(contact: ContactConfiguration) -> str:
+    return CLOSED_FORM if contact.permanent else CHARACTERISTIC

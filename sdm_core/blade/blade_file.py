@@ -44,9 +44,9 @@ def blade_from_dict(data: Any) -> Blade:
         if not isinstance(state, Mapping):
             raise InvalidInput(f"states[{i}]", state, f"give an object with {', '.join(_STATE_REQUIRED)}")
         _require(state, _STATE_REQUIRED, f"states[{i}].")
-        keys = _STATE_REQUIRED + _STATE_OPTIONAL
+        optional_shapes = [state.get(key) for key in _STATE_OPTIONAL]
         try:
-            parsed.append(ModalState(**{key: state.get(key) for key in keys}))
+            parsed.append(ModalState(*(state[key] for key in _STATE_REQUIRED), *optional_shapes))
         except InvalidInput as error:
             raise error.under(f"states[{i}]") from None
     optional = {key: data[key] for key in _OPTIONAL if data.get(key) is not None}

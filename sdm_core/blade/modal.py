@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -146,6 +147,8 @@ class Blade:
                 raise InvalidInput(
                     key, f"{len(values)} numbers", f"give one a tip node: {len(self.tip_nodes)}"
                 )
+        if material is not None and not isinstance(material, dict):
+            raise InvalidInput("material", material, 'give an object such as {"rho": 4400.0}')
         put(self, "material", material)
 
     @property
@@ -232,9 +235,14 @@ class Blade:
         """
         if direction == self.direction:
             return self
-        if direction != "radial" or any(s.mode_shape_radial is None for s in self.states):
+        radial = [s.mode_shape_radial for s in self.states]
+        if direction != "radial" or any(shape is None for shape in radial):
             raise InvalidInput("direction", direction, "every state of the blade must give mode_shape_radial")
-        states = [replace(s, mode_shape=s.mode_shape_radial) for s in self.states]
+        states = [
+            replace(s, mode_shape=shape)
+            for s, shape in zip(self.states, radial, strict=True)
+            if shape is not None
+        ]
         return Blade(
             self.name,
             self.tip_nodes,
@@ -257,7 +265,7 @@ def _shape(name: str, values: Any, modes: int, nodes: int | None) -> np.ndarray:
 
 
 def _node_names(names: Any) -> tuple[str, ...]:
-    if isinstance(names, str) or not hasattr(names, "__len__") or len(names) == 0:
+    if not isinstance(names, list | tuple) or len(names) == 0:
         raise InvalidInput("tip_nodes", names, "give a list of at least one node name")
     for i, node in enumerate(names):
         if not isinstance(node, str) or not node:
@@ -282,7 +290,7 @@ def _damping(values: Any, modes: int) -> np.ndarray:
 
 
 def _ordered_states(states: Any, nodes: int) -> tuple[ModalState, ...]:
-    if not hasattr(states, "__len__") or len(states) == 0:
+    if not isinstance(states, list | tuple) or len(states) == 0:
         raise InvalidInput("states", "[]", "give at least one modal state")
     modes = len(states[0].frequency_hz)
     for i, state in enumerate(states):
@@ -299,7 +307,7 @@ def _ordered_states(states: Any, nodes: int) -> tuple[ModalState, ...]:
                 f"give one a tip node: {nodes}",
             )
     in_order = sorted(states, key=lambda s: s.speed_hz)
-    for before, after in zip(in_order, in_order[1:], strict=False):
+    for before, after in pairwise(in_order):
         if after.speed_hz - before.speed_hz <= 1e-9 * after.speed_hz:
             raise InvalidInput("states", f"two at {after.speed_hz:g} Hz", "give one state a rotor speed")
     return tracked(in_order)

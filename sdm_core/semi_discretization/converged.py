@@ -39,8 +39,8 @@ class Converged:
     """Doubles the steps until Richardson's extrapolations agree to the tolerance.
 
     With an error c·N⁻² the extrapolation (4μ_{2N} − μ_N)/3 removes the leading term; the estimate
-    is the change from the last extrapolation to this one, and never less than what the observed
-    ratio of successive changes supports.
+    is the change from the last extrapolation to this one. The leading few multipliers are
+    extrapolated side by side, because the largest at a coarse step need not be the largest.
 
     Parameters
     ----------
@@ -59,46 +59,43 @@ class Converged:
 
     def dominant(self, equation: DelayEquation) -> ConvergedMultiplier:
         """Dominant multiplier of the equation."""
-        # Neither an oscillation nor a switch of the coefficients may fall between two steps.
+        # No oscillation may fall between two steps.
         mean_a, _ = equation.means(np.zeros(1), np.full(1, equation.tau))
         fastest = float(np.abs(np.linalg.eigvals(mean_a[0]).imag).max()) * equation.tau / (2 * np.pi)
-        steps = max(self.first_steps, 2 * int(np.ceil(fastest)))
-        raw: list[complex] = []
-        better: list[complex] = []
-        while True:
-            method = Averaged(steps)
-            if raw and method.state_size(equation) > self.largest_state:
+        steps = max(self.first_steps, 4 * int(np.ceil(fastest)))
+        spectra: list[np.ndarray] = []
+        answer = ConvergedMultiplier(complex(np.nan, np.nan), np.inf, 0, False)
+        while Averaged(steps).state_size(equation) <= self.largest_state:
+            spectra.append(_leading(Averaged(steps).multipliers(equation)))
+            answer = self._extrapolated(spectra, steps)
+            if answer.converged:
                 break
-            if method.state_size(equation) > 2 * self.largest_state:
-                return ConvergedMultiplier(complex(np.nan, np.nan), np.inf, 0, False)
-            mu = method.multipliers(equation)
-            raw.append(_closest(mu, raw[-1]) if raw else _upper(mu[0]))
-            if len(raw) > 1:
-                better.append(raw[-1] + (raw[-1] - raw[-2]) / (2**ORDER - 1))
-            if len(better) > 1:
-                estimate = self._estimate(raw, better)
-                if estimate <= self.tolerance:
-                    return ConvergedMultiplier(better[-1], estimate, steps, True)
             steps *= 2
-        best = better[-1] if better else raw[-1]
-        estimate = self._estimate(raw, better) if len(better) > 1 else np.inf
-        return ConvergedMultiplier(best, estimate, steps // 2, False)
+        return answer
 
-    @staticmethod
-    def _estimate(raw: list[complex], better: list[complex]) -> float:
-        change = abs(better[-1] - better[-2])
-        ratio = abs(raw[-2] - raw[-3]) / max(abs(raw[-1] - raw[-2]), 1e-300)
-        if ratio < 2:  # not yet in the regime that extrapolation needs
-            change = max(change, abs(raw[-1] - raw[-2]))
-        return change / max(abs(better[-1]), 1e-300)
+    def _extrapolated(self, spectra: list[np.ndarray], steps: int) -> ConvergedMultiplier:
+        fine = spectra[-1]
+        if len(spectra) < 3:
+            return ConvergedMultiplier(complex(fine[0]), np.inf, steps, False)
+        middle = _nearest(fine, spectra[-2])
+        coarse = _nearest(middle, spectra[-3])
+        better = fine + (fine - middle) / (2**ORDER - 1)
+        change = np.abs(better - (middle + (middle - coarse) / (2**ORDER - 1)))
+        slow = np.abs(middle - coarse) < 2 * np.abs(fine - middle)  # not yet falling as N⁻²
+        change = np.where(slow, np.maximum(change, np.abs(fine - middle)), change)
+        best = int(np.argmax(np.abs(better)))
+        # What any of the others may still gain counts against the answer.
+        rival = np.max(np.abs(better) + np.where(slow, change, 0.0)) - np.abs(better[best])
+        estimate = float(max(change[best], rival) / max(np.abs(better[best]), 1e-300))
+        return ConvergedMultiplier(complex(better[best]), estimate, steps, estimate <= self.tolerance)
 
 
-def _upper(mu: complex) -> complex:
-    return complex(mu.real, abs(mu.imag))
+def _leading(mu: np.ndarray, most: int = 10) -> np.ndarray:
+    """The largest multipliers of the upper half-plane."""
+    upper = mu[mu.imag >= -1e-14 * np.abs(mu)]
+    return upper[:most]
 
 
-def _closest(mu: np.ndarray, previous: complex) -> complex:
-    """The dominant multiplier of the finer solution, followed within a group of equal modulus."""
-    rivals = mu[np.abs(mu) >= abs(mu[0]) * (1 - 1e-6)]
-    rivals = np.array([_upper(m) for m in rivals])
-    return complex(rivals[np.argmin(np.abs(rivals - previous))])
+def _nearest(mu: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """For each multiplier the nearest of another spectrum."""
+    return candidates[np.argmin(np.abs(mu[:, None] - candidates[None, :]), axis=1)]

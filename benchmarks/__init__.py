@@ -1,0 +1,1 @@
+"""Long measurements: accuracy of the screening, and speed against the textbook method."""

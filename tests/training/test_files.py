@@ -1,0 +1,136 @@
+"""Datasets and model files: whole, unaltered, or refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from sdm_core.errors import DamagedFile, InvalidInput
+from training.calibration import VerificationBand
+from training.cases import CaseBatch
+from training.dataset import Dataset
+from training.design_space import DesignSpace
+from training.registry import active_id, list_models, load_model, write_model
+from training.surrogate import Architecture, BoundaryNetwork, Surrogate
+
+BAND = VerificationBand(9.0, 5e-4, 0.95, 10_000, 0, "synthetic")
+
+
+@pytest.fixture
+def dataset():
+    cases = DesignSpace().sample(4, 2, seed=1)
+    return Dataset(cases, np.linspace(0.1, 0.8, len(cases)), {"seed": 1})
+
+
+@pytest.fixture
+def models(tmp_path):
+    architecture = Architecture(width=8, blocks=1)
+    surrogate = Surrogate(BoundaryNetwork(architecture), architecture)
+    model = write_model(surrogate, DesignSpace(), BAND, {"seed": 1}, tmp_path)
+    return tmp_path, model
+
+
+def test_a_dataset_reads_back_unchanged_and_is_never_rewritten(dataset, tmp_path):
+    path = dataset.write(tmp_path)
+    stamp = path.stat().st_mtime_ns
+    again = Dataset.read(path)
+    assert again.digest == dataset.digest
+    assert again.provenance == {"seed": 1}
+    np.testing.assert_array_equal(again.kappa, dataset.kappa)
+    assert dataset.write(tmp_path) == path and path.stat().st_mtime_ns == stamp
+
+
+def test_a_dataset_of_other_content_has_another_digest(dataset):
+    other = Dataset(dataset.cases, dataset.kappa * 1.0000001, dataset.provenance)
+    assert other.digest != dataset.digest
+    assert Dataset(dataset.cases, dataset.kappa, {"seed": 2}).digest != dataset.digest
+
+
+def test_a_dataset_cut_short_is_refused(dataset, tmp_path):
+    path = dataset.write(tmp_path)
+    path.chmod(0o644)
+    whole = path.read_bytes()
+    for size in (0, 10, len(whole) // 2, len(whole) - 5):
+        path.write_bytes(whole[:size])
+        with pytest.raises(DamagedFile, match="label again"):
+            Dataset.read(path)
+    with pytest.raises(InvalidInput):
+        Dataset.read(tmp_path / "absent.npz")
+
+
+def test_a_model_reads_back_with_the_same_answers(models):
+    folder, model = models
+    again = load_model(folder=folder)
+    assert again.id == model.id == active_id(folder)
+    cases = DesignSpace().sample(3, 2, seed=2)
+    ours, theirs = model.surrogate.boundary(cases), again.surrogate.boundary(cases)
+    np.testing.assert_array_equal(ours.log_ke, theirs.log_ke)
+    assert again.band == BAND
+    assert again.design_space == DesignSpace()
+    assert [(e.id, e.active) for e in list_models(folder)] == [(model.id, True)]
+
+
+def test_writing_the_same_model_twice_gives_one_model(models):
+    folder, model = models
+    same = write_model(model.surrogate, DesignSpace(), BAND, {"seed": 1}, folder)
+    other = write_model(model.surrogate, DesignSpace(), BAND, {"seed": 2}, folder, activate=False)
+    assert same.id == model.id != other.id
+    assert active_id(folder) == model.id
+    assert len(list_models(folder)) == 2
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.999])
+def test_a_model_file_cut_short_is_refused(models, share):
+    folder, model = models
+    path = folder / model.id / "model.safetensors"
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    with pytest.raises(DamagedFile, match=r"checksum.*rubscreen train"):
+        load_model(folder=folder)
+
+
+def test_a_card_cut_short_or_of_another_code_is_refused(models):
+    folder, model = models
+    path = folder / model.id / "card.json"
+    text = path.read_text()
+    path.write_text(text[: len(text) // 2])
+    with pytest.raises(DamagedFile, match=r"card\.json"):
+        load_model(folder=folder)
+    assert list_models(folder) == []
+    path.write_text(json.dumps({**json.loads(text), "features": ["other"]}))
+    with pytest.raises(DamagedFile, match="other features"):
+        load_model(folder=folder)
+
+
+@pytest.mark.parametrize("name", ["absent", "../models", "", "."])
+def test_an_unknown_model_is_refused_by_name(models, name):
+    folder, _ = models
+    with pytest.raises(InvalidInput, match="name one of"):
+        load_model(name, folder)
+
+
+def test_a_folder_without_models_says_to_train(tmp_path):
+    with pytest.raises(InvalidInput, match="train a model first"):
+        load_model(folder=tmp_path / "nothing")
+
+
+def test_membership_of_the_design_space_names_the_reason():
+    space = DesignSpace()
+    good = space.sample(64, 2, seed=3)
+    assert space.contains(good).mean() > 0.9
+
+    def with_changes(**changes) -> CaseBatch:
+        names = ("omega", "damping_ratio", "contact_matrix", "speed_hz", "mode_count")
+        return CaseBatch(*(changes.get(n, getattr(good, n)) for n in names))
+
+    slow = space.first_violation(with_changes(speed_hz=good.speed_hz * 0.01))
+    assert set(slow) == {"speed/f1 outside 0.045 to 0.85"}
+    damped = space.first_violation(with_changes(damping_ratio=np.full_like(good.omega, 0.1)))
+    assert set(damped) == {"damping_ratio outside 0.00012 to 0.017"}
+    undamped = space.contains(with_changes(damping_ratio=np.zeros_like(good.omega)))
+    assert not undamped.any()
+    untouched = space.first_violation(with_changes(contact_matrix=np.zeros_like(good.contact_matrix)))
+    assert set(untouched) == {"no mode moves the contact nodes"}
+    many = space.first_violation(with_changes(mode_count=np.full(len(good), 6)))
+    assert set(many) == {"more than 5 modes"}
+    with pytest.raises(InvalidInput):
+        space.sample(0, 1, seed=1)

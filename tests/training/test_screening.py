@@ -1,0 +1,166 @@
+"""Surrogate or exact: the policy, on the shipped model and real blades."""
+
+import numpy as np
+import pytest
+
+from sdm_core.blade import EXAMPLES, Blade, ModalState, example_blade
+from sdm_core.boundary import boundary, verdicts
+from sdm_core.contact import ContactConfiguration
+from sdm_core.errors import InvalidInput, OutOfSpeedRange, TooMuchWork
+from training.answers import CONFIDENT, EXACT, NEAR_BOUNDARY, OUT_OF_DOMAIN, REQUESTED, SURROGATE
+from training.cases import CaseBatch
+from training.evaluation import evaluate
+from training.features import MODE_FEATURES, PHASE_FEATURES, features
+from training.labelling import critical_kappa
+from training.reference_space import NAME, reference_sample
+from training.screening import Screener
+
+LE = ContactConfiguration.at("LE")
+ARCS = ContactConfiguration({"LE": 1.0}, [[0.0, 0.25], [0.5, 0.75]])
+
+
+@pytest.fixture(scope="module")
+def screener():
+    return Screener.default()
+
+
+@pytest.fixture(scope="module")
+def rotor_37():
+    return example_blade("nasa_rotor_37")
+
+
+@pytest.fixture(scope="module")
+def unseen():
+    sample = reference_sample(1500, seed=60_001)
+    critical = critical_kappa(sample.cases, workers=1) * sample.cases.stiffness_scale
+    return sample, critical
+
+
+def test_the_shipped_model_keeps_its_promises_on_points_it_never_saw(screener, unseen):
+    sample, critical = unseen
+    model = screener.model
+    found = evaluate(
+        model.surrogate.boundary(sample.cases),
+        model.band,
+        model.design_space.contains(sample.cases),
+        sample.ke,
+        critical,
+        sample.ke > critical,
+        distribution=NAME,
+    )
+    assert found.median_boundary_error <= 0.01
+    assert found.auto.false_stable == 0
+    assert found.auto.false_unstable_rate <= 0.01
+    assert found.auto.exact_share <= 0.10
+    assert found.alone.false_stable_rate <= 0.01
+
+
+def test_the_shipped_model_needs_its_phase_features(screener, unseen, monkeypatch):
+    sample, critical = unseen
+    informed = screener.model.surrogate.boundary(sample.cases).log_ke
+
+    def shuffled(cases):
+        found = features(cases)
+        blind = [i for i, name in enumerate(MODE_FEATURES) if name in PHASE_FEATURES]
+        by_mode = found.inputs[:, : 5 * len(MODE_FEATURES)].view(len(cases), len(MODE_FEATURES), 5)
+        by_mode[:, blind] = by_mode.roll(1, dims=0)[:, blind]
+        return found
+
+    monkeypatch.setattr("training.surrogate.features", shuffled)
+    blind = screener.model.surrogate.boundary(sample.cases).log_ke
+    truth = np.log10(critical)
+    assert np.median(np.abs(blind - truth)) > 4 * np.median(np.abs(informed - truth))
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("nodes", [("LE",), ("TE",), ("LE", "TE")])
+def test_an_automatic_map_of_a_real_blade_has_every_verdict_of_the_exact_core(screener, name, nodes):
+    blade, contact = example_blade(name), ContactConfiguration.at(*nodes)
+    speed = np.linspace(0.06 * blade.first_frequency_hz, blade.speed_range_hz[1], 60)
+    ke = np.linspace(0.0, 1e5, 60)
+    assert screener.model.design_space.contains(CaseBatch.from_blade(blade, contact, speed)).all()
+    found = screener.map(blade, contact, speed, ke)
+    grid = np.meshgrid(speed, ke)
+    exact = verdicts(blade, contact, grid[0].ravel(), grid[1].ravel()).reshape(60, 60)
+    np.testing.assert_array_equal(found.stable, exact)
+    assert found.exact_share <= 0.10
+    assert ((found.source == EXACT) == (found.reason == NEAR_BOUNDARY)).all()
+    assert np.isnan(found.unstable_probability[found.source == EXACT]).all()
+
+
+def test_boundary_of_a_real_blade_is_that_of_the_exact_core(screener, rotor_37):
+    speed = np.linspace(60.0, 300.0, 120)
+    found = screener.boundary(rotor_37, LE, speed, 2.5e4)
+    exact = boundary(rotor_37, LE, speed, 2.5e4)
+    np.testing.assert_array_equal(np.isnan(found.critical_ke), np.isnan(exact.critical_ke))
+    there = ~np.isnan(exact.critical_ke)
+    error = np.abs(found.critical_ke[there] / exact.critical_ke[there] - 1)
+    assert np.median(error) < 0.01 and error.max() < 0.05
+    answered = found.source == SURROGATE
+    assert (error <= found.error_estimate[there] + 1e-9)[answered[there]].mean() > 0.95
+
+
+def test_points_say_where_their_answer_comes_from(screener, rotor_37):
+    critical = boundary(rotor_37, LE, np.array([250.0]), 1e6).critical_ke[0]
+    ke = critical * np.array([0.2, 0.999, 1.001, 5.0])
+    found = screener.points(rotor_37, LE, np.full(4, 250.0), ke)
+    assert list(found.source) == [SURROGATE, EXACT, EXACT, SURROGATE]
+    assert list(found.reason) == [CONFIDENT, NEAR_BOUNDARY, NEAR_BOUNDARY, CONFIDENT]
+    assert list(found.stable) == [1.0, 1.0, 0.0, 0.0]
+    assert np.isnan(found.spectral_radius[[0, 3]]).all()
+    assert found.spectral_radius[1] < 1 < found.spectral_radius[2]
+    assert found.unstable_probability[0] < 0.01 and found.unstable_probability[3] > 0.99
+    assert found.model == screener.model_id
+
+
+def test_arcs_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
+    arcs = screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]))
+    assert (arcs.source[0], arcs.reason[0]) == (EXACT, OUT_OF_DOMAIN)
+    slow = screener.boundary(rotor_37, LE, np.array([20.0]), 2.5e4)
+    assert (slow.source[0], slow.reason[0]) == (EXACT, OUT_OF_DOMAIN)
+    asked = screener.map(rotor_37, LE, np.array([250.0]), np.array([1e3]), policy="exact")
+    assert (asked.source[0, 0], asked.reason[0, 0]) == (EXACT, REQUESTED)
+
+
+def test_the_surrogate_alone_refuses_what_lies_outside_its_domain(screener, rotor_37):
+    with pytest.raises(InvalidInput, match="arcs of contact"):
+        screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]), policy="surrogate")
+    with pytest.raises(InvalidInput, match=r"speed_hz\[1\] = 20 Hz: speed/f1 outside"):
+        screener.boundary(rotor_37, LE, np.array([250.0, 20.0]), 2.5e4, policy="surrogate")
+
+
+def test_more_exact_work_than_allowed_is_refused(rotor_37):
+    small = Screener(None, exact_budget_s=1.0)
+    with pytest.raises(TooMuchWork, match="at most 25"):
+        small.points(rotor_37, LE, np.full(30, 250.0), np.full(30, 1e3), policy="exact")
+    with pytest.raises(TooMuchWork):
+        small.map(rotor_37, ARCS, np.linspace(100, 200, 40), np.linspace(0, 1e3, 40), policy="exact")
+
+
+def test_without_a_model_only_exact_answers_are_given(rotor_37):
+    empty = Screener(None)
+    with pytest.raises(InvalidInput, match="no model is loaded"):
+        empty.points(rotor_37, LE, np.array([250.0]), np.array([1e3]))
+    assert empty.points(rotor_37, LE, np.array([250.0]), np.array([1e3]), policy="exact").stable[0] == 1.0
+
+
+def test_bad_questions_are_refused_whatever_the_policy(screener, rotor_37):
+    for policy in ("auto", "surrogate", "exact"):
+        with pytest.raises(InvalidInput, match=r"contact\.weights\.tip"):
+            screener.points(
+                rotor_37, ContactConfiguration.at("tip"), np.array([250.0]), np.array([1.0]), policy
+            )
+        with pytest.raises(OutOfSpeedRange):
+            screener.boundary(rotor_37, LE, np.array([999.0]), 1e4, policy)
+    with pytest.raises(InvalidInput, match="policy"):
+        screener.map(rotor_37, LE, np.array([250.0]), np.array([1.0]), policy="guess")
+    with pytest.raises(InvalidInput, match="ke = 1 numbers"):
+        screener.points(rotor_37, LE, np.array([250.0, 260.0]), np.array([1.0]))
+
+
+def test_a_blade_whose_contact_node_never_moves_is_stable_without_a_crossing(screener):
+    still = Blade("still", ("a", "b"), 1e-3, [ModalState(0.0, np.array([100.0]), np.array([[0.0, 1.0]]))])
+    contact = ContactConfiguration.at("a")
+    found = screener.boundary(still, contact, np.array([30.0]), 1e6)
+    assert np.isnan(found.critical_ke[0]) and found.unstable_ke[0] == ()
+    assert screener.points(still, contact, np.array([30.0]), np.array([1e6])).stable[0] == 1.0

@@ -1,0 +1,89 @@
+"""Labelled cases with their provenance, immutable once written."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sdm_core.errors import DamagedFile, InvalidInput
+from training.cases import CaseBatch
+
+FORMAT = "rubscreen/dataset/1"
+_ARRAYS = ("omega", "damping_ratio", "contact_matrix", "speed_hz", "mode_count")
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Cases and the κ of their first crossings (infinite: none up to the labelling's largest κ).
+
+    Attributes
+    ----------
+    cases
+        m cases.
+    kappa
+        Shape (m,).
+    provenance
+        Where they come from: design space, seed, counts, method, code version.
+    """
+
+    cases: CaseBatch
+    kappa: np.ndarray
+    provenance: dict[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the arrays and their provenance."""
+        h = hashlib.sha256(json.dumps(self.provenance, sort_keys=True).encode())
+        for name, array in self._arrays().items():
+            h.update(name.encode() + str(array.dtype).encode() + str(array.shape).encode())
+            h.update(np.ascontiguousarray(array).tobytes())
+        return h.hexdigest()
+
+    def write(self, folder: Path) -> Path:
+        """Write to `folder` under its digest; a dataset already there is left untouched."""
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"dataset-{self.digest[:16]}.npz"
+        if not path.exists():
+            buffer = io.BytesIO()
+            header = json.dumps({"format": FORMAT, "digest": self.digest, "provenance": self.provenance})
+            arrays: dict[str, Any] = {"header": np.frombuffer(header.encode(), np.uint8), **self._arrays()}
+            np.savez_compressed(buffer, **arrays)
+            partial = path.with_suffix(f".{os.getpid()}.partial")
+            partial.write_bytes(buffer.getvalue())
+            partial.replace(path)
+            path.chmod(0o444)
+        return path
+
+    @classmethod
+    def read(cls, path: Path) -> Dataset:
+        """Read a dataset back.
+
+        Raises
+        ------
+        InvalidInput
+            When there is no such file.
+        DamagedFile
+            When it is cut short, altered or of another kind.
+        """
+        if not path.is_file():
+            raise InvalidInput("dataset", str(path), "give a dataset file")
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                header = json.loads(bytes(data["header"]))
+                cases = CaseBatch(*(data[name] for name in _ARRAYS))
+                found = cls(cases, data["kappa"], header["provenance"])
+        except Exception as error:  # zipfile and zlib raise their own kinds
+            raise DamagedFile("dataset", str(path), f"it cannot be read ({error}); label again") from None
+        if header.get("format") != FORMAT or found.digest != header.get("digest"):
+            raise DamagedFile("dataset", str(path), "its checksum does not hold; label again")
+        return found
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {**{name: getattr(self.cases, name) for name in _ARRAYS}, "kappa": self.kappa}

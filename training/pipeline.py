@@ -1,0 +1,164 @@
+"""One command trains: sample, label, fit, calibrate, evaluate, write."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+
+from sdm_core.version import __version__
+from training.calibration import calibrate
+from training.dataset import Dataset
+from training.design_space import DesignSpace
+from training.evaluation import Evaluation, evaluate
+from training.fit import FitSettings, fit
+from training.labelling import KAPPA_MAX, critical_kappa
+from training.reference_space import NAME, reference_sample
+from training.registry import Model, write_model
+
+Progress = Callable[[str, int, int, str], None]
+"""Called with (stage, done, of, remark)."""
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """What training does; the defaults write the shipped model.
+
+    Attributes
+    ----------
+    designs, speeds_each
+        Size of the training set: blades, and speeds of each.
+    calibration_points, evaluation_points
+        Independent points of the reference design space.
+    seed
+        Of everything; evaluation and calibration use seeds derived from it.
+    threads
+        Torch threads and labelling processes. With seed, thread count and machine the same, so
+        are the figures.
+    """
+
+    designs: int = 32_768
+    speeds_each: int = 6
+    calibration_points: int = 20_000
+    evaluation_points: int = 20_000
+    seed: int = 2013
+    threads: int = 2
+    fit: FitSettings = field(default_factory=FitSettings)
+    design_space: DesignSpace = field(default_factory=DesignSpace)
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """The written model, its held-out figures and how long each stage took, s."""
+
+    model: Model
+    evaluation: Evaluation
+    dataset_path: Path
+    seconds: dict[str, float]
+
+
+def train(
+    models_folder: Path,
+    settings: TrainingSettings | None = None,
+    *,
+    data_folder: Path | None = None,
+    activate: bool = True,
+    progress: Progress = lambda stage, done, of, remark: None,
+) -> TrainingResult:
+    """Train a model from nothing and write it.
+
+    Parameters
+    ----------
+    models_folder
+        Where the model folder goes.
+    data_folder
+        Where the labelled dataset goes; by default a ``datasets`` folder beside the models.
+    activate
+        Make it the active model of its folder.
+
+    Raises
+    ------
+    CalibrationFailed
+        When no verification band keeps the false-stable bound; nothing is written then.
+    """
+    s = settings or TrainingSettings()
+    seconds: dict[str, float] = {}
+    clock = time.perf_counter()
+
+    def lap(stage: str) -> None:
+        nonlocal clock
+        seconds[stage] = round(time.perf_counter() - clock, 1)
+        clock = time.perf_counter()
+
+    dataset = labelled_dataset(s, progress)
+    dataset_path = dataset.write(data_folder or models_folder.parent / "datasets")
+    lap("label")
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(s.threads)
+    try:
+        surrogate = fit(
+            dataset.cases,
+            dataset.kappa,
+            s.fit,
+            seed=s.seed,
+            progress=lambda epoch, of, loss: progress("fit", epoch, of, f"loss {loss:.4f}"),
+        )
+    finally:
+        torch.set_num_threads(before)
+    lap("fit")
+
+    sample, critical, unstable = _truth(s.calibration_points, s.seed + 1, s.threads, "calibrate", progress)
+    band = calibrate(surrogate.boundary(sample.cases), sample.ke, unstable, distribution=NAME)
+    lap("calibrate")
+
+    sample, critical, unstable = _truth(s.evaluation_points, s.seed + 2, s.threads, "evaluate", progress)
+    inside = s.design_space.contains(sample.cases)
+    found = surrogate.boundary(sample.cases)
+    evaluation = evaluate(found, band, inside, sample.ke, critical, unstable, distribution=NAME)
+    lap("evaluate")
+
+    card = {
+        "code_version": __version__,
+        "seed": s.seed,
+        "threads": s.threads,
+        "dataset": {"sha256": dataset.digest, **dataset.provenance},
+        "fit": s.fit.to_dict(),
+        "evaluation": {**evaluation.to_dict(), "seed": s.seed + 2},
+        "calibration": {"points": s.calibration_points, "seed": s.seed + 1},
+    }
+    model = write_model(surrogate, s.design_space, band, card, models_folder, activate=activate)
+    return TrainingResult(model, evaluation, dataset_path, seconds)
+
+
+def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
+    """Sample the design space and label it with the exact core."""
+    progress("sample", 0, s.designs, "")
+    cases = s.design_space.sample(s.designs, s.speeds_each, s.seed)
+    progress("sample", s.designs, s.designs, "")
+    kappa = critical_kappa(
+        cases, workers=s.threads, progress=lambda done, of: progress("label", done, of, "exact core")
+    )
+    provenance = {
+        "design_space": s.design_space.to_dict(),
+        "sampling": "scrambled Sobol",
+        "designs": s.designs,
+        "speeds_each": s.speeds_each,
+        "seed": s.seed,
+        "labels": "closed-form first crossing, one in sixteen audited by root count",
+        "kappa_max": KAPPA_MAX,
+        "code_version": __version__,
+    }
+    return Dataset(cases, kappa, provenance)
+
+
+def _truth(points: int, seed: int, workers: int, stage: str, progress: Progress):
+    sample = reference_sample(points, seed)
+    kappa = critical_kappa(
+        sample.cases, workers=workers, progress=lambda done, of: progress(stage, done, of, "exact core")
+    )
+    critical = kappa * sample.cases.stiffness_scale
+    return sample, critical, sample.ke > critical

@@ -1,0 +1,172 @@
+"""Model files: safetensors and a JSON card in a folder named after their content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import safetensors.torch
+from safetensors import SafetensorError
+
+from sdm_core.errors import DamagedFile, InvalidInput
+from training.calibration import VerificationBand
+from training.design_space import DesignSpace
+from training.features import feature_names
+from training.surrogate import Architecture, BoundaryNetwork, Surrogate
+
+FORMAT = "rubscreen/model/1"
+SHIPPED = Path(__file__).parent / "models"
+_WEIGHTS, _CARD, _ACTIVE = "model.safetensors", "card.json", "active"
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything needed to answer: network, domain, verification band, card."""
+
+    id: str
+    surrogate: Surrogate
+    design_space: DesignSpace
+    band: VerificationBand
+    card: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """A line of the model list."""
+
+    id: str
+    active: bool
+    card: dict[str, Any]
+
+
+def write_model(
+    surrogate: Surrogate,
+    design_space: DesignSpace,
+    band: VerificationBand,
+    card: dict[str, Any],
+    folder: Path = SHIPPED,
+    *,
+    activate: bool = True,
+) -> Model:
+    """Write a model into its own folder under `folder`, whole or not at all.
+
+    The identifier is the hash of weights and card, so a model never changes under its name.
+    """
+    weights = safetensors.torch.save(surrogate.network.state_dict())
+    full = {
+        "format": FORMAT,
+        **card,
+        "architecture": surrogate.architecture.to_dict(),
+        "features": list(feature_names()),
+        "design_space": design_space.to_dict(),
+        "verification_band": band.to_dict(),
+        "weights_sha256": hashlib.sha256(weights).hexdigest(),
+    }
+    text = json.dumps(full, indent=1, sort_keys=True) + "\n"
+    model_id = hashlib.sha256(weights + text.encode()).hexdigest()[:16]
+    target = folder / model_id
+    if not target.exists():
+        partial = folder / f".{model_id}.{os.getpid()}.partial"
+        partial.mkdir(parents=True)
+        (partial / _WEIGHTS).write_bytes(weights)
+        (partial / _CARD).write_text(text, encoding="utf-8")
+        partial.replace(target)
+    if activate:
+        pointer = folder / f".{_ACTIVE}.{os.getpid()}.partial"
+        pointer.write_text(model_id + "\n", encoding="utf-8")
+        pointer.replace(folder / _ACTIVE)
+    return Model(model_id, surrogate, design_space, band, full)
+
+
+def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
+    """Load a model; None is the active one.
+
+    Raises
+    ------
+    InvalidInput
+        When there is no such model.
+    DamagedFile
+        When its files are cut short, altered or of another format.
+    """
+    chosen = active_id(folder) if model_id is None else model_id
+    place = folder / chosen
+    if not chosen.isalnum() or not place.is_dir():
+        raise InvalidInput(
+            "model", chosen, f"name one of {', '.join(_ids(folder)) or 'none: train one first'}"
+        )
+    card = _read_card(place)
+    try:
+        weights = (place / _WEIGHTS).read_bytes()
+    except OSError as error:
+        raise DamagedFile(
+            "model", str(place / _WEIGHTS), f"cannot be read ({error.strerror}); {_MEND}"
+        ) from None
+    if hashlib.sha256(weights).hexdigest() != card["weights_sha256"]:
+        raise DamagedFile(
+            "model", str(place / _WEIGHTS), f"its checksum does not hold ({len(weights)} bytes); {_MEND}"
+        )
+    if card["features"] != list(feature_names()):
+        raise DamagedFile(
+            "model", str(place), f"it was trained on other features than this code has; {_MEND}"
+        )
+    try:
+        architecture = Architecture(**card["architecture"])
+        network = BoundaryNetwork(architecture)
+        network.load_state_dict(safetensors.torch.load(weights))
+        space = DesignSpace.from_dict(card["design_space"])
+        band = VerificationBand(**card["verification_band"])
+    except (SafetensorError, RuntimeError, TypeError, KeyError) as error:
+        raise DamagedFile("model", str(place), f"its files do not fit together ({error}); {_MEND}") from None
+    return Model(chosen, Surrogate(network, architecture), space, band, card)
+
+
+_MEND = "restore it from the distribution, train again with `rubscreen train`, or activate another model"
+
+
+def active_id(folder: Path = SHIPPED) -> str:
+    """Identifier of the active model."""
+    try:
+        return (folder / _ACTIVE).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        raise InvalidInput(
+            "models folder", str(folder), "train a model first: it has no active one"
+        ) from None
+
+
+def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
+    """Every whole model of a folder, the active one first."""
+    try:
+        active = active_id(folder)
+    except InvalidInput:
+        active = ""
+    entries = []
+    for name in _ids(folder):
+        try:
+            entries.append(ModelEntry(name, name == active, _read_card(folder / name)))
+        except DamagedFile:
+            continue
+    return sorted(entries, key=lambda e: (not e.active, e.id))
+
+
+def _ids(folder: Path) -> list[str]:
+    if not folder.is_dir():
+        return []
+    return sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "_")))
+
+
+def _read_card(place: Path) -> dict[str, Any]:
+    try:
+        card = json.loads((place / _CARD).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DamagedFile("model", str(place / _CARD), f"cannot be read ({error}); {_MEND}") from None
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise DamagedFile("model", str(place / _CARD), f"it is not a {FORMAT} card; {_MEND}")
+    needed = ("weights_sha256", "features", "architecture", "design_space", "verification_band")
+    for key in needed:
+        if key not in card:
+            raise DamagedFile("model", str(place / _CARD), f"{key} is missing; {_MEND}")
+    return card
