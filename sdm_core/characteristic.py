@@ -11,6 +11,7 @@ from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
 _MOST_POINTS = 60_000
+_MOST_OSCILLATIONS = 200_000.0  # rad a revolution that the chatter frequency is looked for among
 
 
 class _Exponential:
@@ -169,7 +170,7 @@ class CharacteristicEquation:
         # Contact shifts the phase of mode j over a revolution by about K_e G_jj τ |1/μ − 1|/(2ω_j).
         p = self.problem
         shift = p.ke * p.contact_matrix.diagonal() / (2 * p.omega) * p.tau * (1 + 1 / radius)
-        return 33 + min(2000, int(4 * shift.sum()))
+        return 33 + int(min(2000.0, 4 * shift.sum()))
 
     def dominant(self, unstable: int | None = None) -> tuple[complex, float]:
         """Multiplier of largest modulus (upper half-plane) and the relative error of its modulus.
@@ -225,6 +226,8 @@ class CharacteristicEquation:
         state = vectors[:, np.argmin(np.abs(nu - mu))]
         # Enough equal samples of a revolution for the fastest oscillation there can be.
         fastest = np.sqrt(p.omega.max() ** 2 + 2 * p.ke * np.trace(p.contact_matrix))
+        if not fastest * p.tau < _MOST_OSCILLATIONS:
+            return float("nan")
         samples = 64 * int(np.ceil(max(8.0, fastest * p.tau / 8)))
         engaged = self._free + (1 / mu - 1) * self._contact
         edges = np.cumsum([0.0, *(s.length for s in p.segments)])

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdm_core.errors import TooMuchWork
 from sdm_core.receptance import ContactReceptance, Sweep, swept
 
+MOST_CANDIDATES = 1_000_000
 _SUBDIVISION = np.linspace(0.0, 1.0, 9)
 
 
@@ -106,7 +108,14 @@ def _candidates(sweep: Sweep, tau: float) -> tuple[np.ndarray, np.ndarray, np.nd
     useful = (z.real[:-1] < 0.05 * np.abs(z[:-1])) | (z.real[1:] < 0.05 * np.abs(z[1:]))
     start, end = start[useful], end[useful]
     first = np.ceil(np.minimum(start, end))
-    count = np.maximum(np.floor(np.maximum(start, end)) - first + 1, 0).astype(int)
+    every = np.maximum(np.floor(np.maximum(start, end)) - first + 1, 0)
+    if not every.sum() < MOST_CANDIDATES:
+        raise TooMuchWork(
+            "speed_hz",
+            float(1 / tau),
+            f"raise it or lower K_e: {every.sum():.3g} possible crossings to solve",
+        )
+    count = every.astype(int)
     index = np.repeat(np.arange(len(count)), count)
     rank = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
     k = first[index] + rank

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sdm_core.errors import TooMuchWork
 from sdm_core.receptance import ContactReceptance
 
+MOST_FREQUENCIES = 1_000_000
 _LARGEST_STEP = 0.8  # rad of phase between neighbouring frequencies
 
 
@@ -63,7 +65,14 @@ def _frequencies(receptance: ContactReceptance, tau: float, ke: float) -> np.nda
     omega = receptance.omega
     strength = (receptance.factor**2).sum()
     high = np.sqrt(omega.max() ** 2 + 8 * ke * strength)
-    grid = [np.linspace(0.0, high, max(64, int(6 * high * tau / (2 * np.pi))))]
+    points = max(64.0, 6 * high * tau / (2 * np.pi))
+    if not points < MOST_FREQUENCIES:
+        raise TooMuchWork(
+            "ke",
+            float(ke),
+            f"lower K_e or raise the speed: {points / 6:.3g} oscillations a revolution to count",
+        )
+    grid = [np.linspace(0.0, high, int(points))]
     for centre, damping in zip(omega, receptance.damping_ratio, strict=True):
         width = max(damping, 1e-8)
         offset = (

@@ -13,6 +13,9 @@ from sdm_core.delay_equation import DelayEquation, Engagement
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 
+LEAST_DAMPING = 1e-8
+"""An undamped mode is taken with this ξ: the limit of vanishing damping, in which every proof holds."""
+
 
 @dataclass(frozen=True)
 class RubbingBlade:
@@ -23,7 +26,7 @@ class RubbingBlade:
     omega
         Λ, natural angular frequencies, rad/s, shape (n,).
     damping_ratio
-        ξ, shape (n,).
+        ξ, shape (n,); of a blade at least `LEAST_DAMPING`.
     contact_shape
         W^½ V_bᵀ, kg^-1/2, shape (r, n); G = contact_shapeᵀ contact_shape.
     speed_hz
@@ -81,8 +84,9 @@ class RubbingBlade:
         omega, shape = blade.at_speeds(speed_hz, extrapolate=extrapolate)
         arcs = None if contact.permanent else contact.arcs
         segments = contact.segments if arcs else (Segment(1.0, True),)
+        damping = np.maximum(blade.damping_ratio, LEAST_DAMPING)
         return [
-            cls(w, blade.damping_ratio, root[:, None] * v.T, float(s), 0.0, arcs, segments)
+            cls(w, damping, root[:, None] * v.T, float(s), 0.0, arcs, segments)
             for s, w, v in zip(speed_hz, omega, shape, strict=True)
         ]
 

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from sdm_core.blade import Blade
+from sdm_core.contact import ContactConfiguration
 from service.speeds import evenly_timed
 from training.answers import BoundaryAnswers
 
-# Near its tip a lobe is 1/|sin(2πf/Ω)| wide in K_e: 16 speeds a lobe of the highest mode bracket
-# every tip, and a parabola through the lowest three ranks the tips to about 0.1 %.
-SPEEDS_PER_LOBE = 16
+# A lobe's edge is about K_e ∝ 1/|sin(2πf/Ω)|: 8 speeds a lobe of the highest mode bracket every tip,
+# and a parabola through the lowest three ranks the tips to better than 1 %.
+SPEEDS_PER_LOBE = 8
 FEWEST_SPEEDS, MOST_SPEEDS = 64, 2000
-SPEEDS_PER_ROUND = 9
+# Between two such speeds a lobe's edge rises to at most 1/cos(π/8) = 1.08 times its tip: looked for
+# up to 1.2 times the largest K_e of interest, no tip below it hides between the speeds of a grid.
+SEARCH_MARGIN = 1.2
+SPEEDS_TO_BEGIN = 9
 MOST_ROUNDS = 10
 
 
@@ -45,13 +50,39 @@ class CriticalSpeed:
     lobes_per_revolution: float
     error_estimate: float
 
+    @property
+    def proven(self) -> bool:
+        """False where the core could not prove that `ke` is the first crossing."""
+        return bool(np.isfinite(self.error_estimate))
 
-def lobe_grid(blade: Blade, low_hz: float, high_hz: float) -> np.ndarray:
-    """Rising speeds in Hz dense enough to put several on every lobe of every mode."""
-    highest = float(max(state.frequency_hz.max() for state in blade.states))
+
+def lobe_grid(blade: Blade, contact: ContactConfiguration, even_hz: np.ndarray, ke_max: float) -> np.ndarray:
+    """Rising speeds in Hz dense enough to put several on every lobe that reaches below `ke_max`.
+
+    Evenly spaced in 1/Ω, as lobes are, from end to end of `even_hz`, and those of `even_hz`: the
+    abscissa of a map, rising. They draw the steep flanks of the wide lobes at high speed.
+    """
+    low_hz, high_hz = float(even_hz[0]), float(even_hz[-1])
+    highest = _highest_frequency(blade, contact, ke_max)
     lobes = highest * (1.0 / low_hz - 1.0 / high_hz)
     count = int(np.clip(np.ceil(SPEEDS_PER_LOBE * lobes), FEWEST_SPEEDS, MOST_SPEEDS))
-    return evenly_timed(low_hz, high_hz, count)
+    rising = np.union1d(evenly_timed(low_hz, high_hz, count), even_hz)
+    return rising[np.concatenate(([True], np.diff(rising) > 1e-9 * high_hz))]
+
+
+def _highest_frequency(blade: Blade, contact: ContactConfiguration, ke_max: float) -> float:
+    """Of the modes whose lobes can reach below `ke_max`, Hz.
+
+    Alone, mode j is stable below 2ξ_j(1 + ξ_j)ω_j²/G_jj (DESIGN, section 6). Other modes move that
+    little where frequencies are many bandwidths apart; a mode counts up to four times `ke_max`.
+    """
+    weights, damping = contact.weight_vector(blade.tip_nodes), blade.damping_ratio
+    highest = blade.first_frequency_hz
+    for state in blade.states:
+        strength = state.mode_shape**2 @ weights
+        alone = 2 * damping * (1 + damping) * (2 * np.pi * state.frequency_hz) ** 2
+        highest = max(highest, *state.frequency_hz[alone <= 4 * ke_max * strength], highest)
+    return float(highest)
 
 
 def deepest_lobe_tips(
@@ -59,14 +90,15 @@ def deepest_lobe_tips(
     exact: Callable[[np.ndarray], BoundaryAnswers],
     first_frequency_hz: float,
     *,
+    ke_max: float,
     count: int = 8,
     tolerance: float = 1e-4,
 ) -> tuple[CriticalSpeed, ...]:
     """The tips of the `count` deepest lobes seen on a grid of speeds, smallest K_e first.
 
-    Every lobe's minimum on the grid is bracketed by its neighbours. Each round asks the exact core
-    for nine speeds across all brackets in one call and keeps the two gaps beside the lowest, until
-    no K_e changes by more than `tolerance`, relative.
+    Every lobe's minimum on the grid is bracketed by its neighbours. The exact core is asked for nine
+    speeds across each bracket, then for three in each gap beside the lowest, all lobes in one call,
+    until a lobe's K_e changes by no more than `tolerance`, relative.
 
     Parameters
     ----------
@@ -76,37 +108,85 @@ def deepest_lobe_tips(
         First crossings by the exact core at given speeds, shape (m,).
     first_frequency_hz
         At rest, for `speed_ratio`.
+    ke_max
+        Tips above it are left out, N/m. `grid` and `exact` should look up to `SEARCH_MARGIN` times it.
 
     Returns
     -------
-    Empty when no speed of the grid has a crossing, or the exact core confirms none.
+    Empty when no lobe seen on the grid has its tip below `ke_max`, by the exact core.
     """
     period, at = 1.0 / grid.speed_hz, _lowest_minima(grid.critical_ke, count)
-    if len(at) == 0:
-        return ()
-    low, high = period[np.maximum(at - 1, 0)], period[np.minimum(at + 1, len(period) - 1)]
-    before = np.full(len(at), np.inf)
+    ends = zip(period[np.maximum(at - 1, 0)], period[np.minimum(at + 1, len(period) - 1)], strict=True)
+    done: list[_Lobe] = []
+    lobes = [_Lobe.unknown() for _ in at]
+    asked = [np.linspace(low, high, SPEEDS_TO_BEGIN) for low, high in ends]
     for _ in range(MOST_ROUNDS):
-        tau = np.linspace(low, high, SPEEDS_PER_ROUND)
-        answer = exact(1.0 / tau.ravel())
-        ke = np.nan_to_num(answer.critical_ke, nan=np.inf).reshape(tau.shape)
-        best = ke.argmin(axis=0)
-        column = np.arange(len(at))
-        least = ke[best, column]
-        with np.errstate(invalid="ignore"):
-            change = np.where(np.isfinite(least) & np.isfinite(before), np.abs(before - least) / least, np.inf)
-        low = tau[np.maximum(best - 1, 0), column]
-        high = tau[np.minimum(best + 1, SPEEDS_PER_ROUND - 1), column]
-        before = least
-        if (change[np.isfinite(least)] <= tolerance).all():
+        if not lobes:
             break
-    flat = best * len(at) + column
-    tips = [
-        _tip(answer, int(i), float(step), first_frequency_hz)
-        for i, step in zip(flat, change, strict=True)
-        if np.isfinite(answer.critical_ke[i])
-    ]
+        answer = exact(1.0 / np.concatenate(asked))
+        parts = np.split(np.arange(len(answer.speed_hz)), np.cumsum([len(a) for a in asked])[:-1])
+        told = [lobe.told(answer, part) for lobe, part in zip(lobes, parts, strict=True)]
+        done += [lobe for lobe in told if lobe.change <= tolerance]
+        lobes = [lobe for lobe in told if lobe.change > tolerance and np.isfinite(lobe.least)]
+        asked = [lobe.finer() for lobe in lobes]
+    tips = (lobe.tip(first_frequency_hz) for lobe in done + lobes if lobe.least <= ke_max)
     return tuple(sorted(tips, key=lambda tip: tip.ke))
+
+
+@dataclass(frozen=True)
+class _Lobe:
+    """What the exact core said near one lobe's tip, by rising period 1/Ω.
+
+    Attributes
+    ----------
+    change
+        Relative change of the smallest K_e in the last round.
+    """
+
+    period: np.ndarray
+    ke: np.ndarray
+    chatter_hz: np.ndarray
+    error_estimate: np.ndarray
+    change: float
+
+    @classmethod
+    def unknown(cls) -> _Lobe:
+        nothing = np.zeros(0)
+        return cls(nothing, nothing, nothing, nothing, np.inf)
+
+    @property
+    def least(self) -> float:
+        return float(self.ke.min(initial=np.inf))
+
+    def told(self, answer: BoundaryAnswers, part: np.ndarray) -> _Lobe:
+        """The lobe with what the core answered at `part` of its speeds."""
+        period = np.concatenate((self.period, 1.0 / answer.speed_hz[part]))
+        ke = np.concatenate((self.ke, np.nan_to_num(answer.critical_ke[part], nan=np.inf)))
+        chatter = np.concatenate((self.chatter_hz, answer.chatter_hz[part]))
+        error = np.concatenate((self.error_estimate, answer.error_estimate[part]))
+        rising = np.argsort(period)
+        least = ke.min()
+        change = abs(self.least - least) / least if np.isfinite(self.least) else np.inf
+        return _Lobe(period[rising], ke[rising], chatter[rising], error[rising], change)
+
+    def finer(self) -> np.ndarray:
+        """Periods of the next round: three in each gap beside the lowest."""
+        i = int(np.argmin(self.ke))
+        near = self.period[max(i - 1, 0) : i + 2]
+        return np.concatenate([a + (b - a) * np.array([0.25, 0.5, 0.75]) for a, b in pairwise(near)])
+
+    def tip(self, first_frequency_hz: float) -> CriticalSpeed:
+        i = int(np.argmin(self.ke))
+        speed, chatter = 1.0 / float(self.period[i]), float(self.chatter_hz[i])
+        return CriticalSpeed(
+            ke=float(self.ke[i]),
+            speed_hz=speed,
+            speed_rpm=60.0 * speed,
+            speed_ratio=speed / first_frequency_hz,
+            chatter_hz=chatter,
+            lobes_per_revolution=chatter / speed,
+            error_estimate=float(self.error_estimate[i] + self.change),
+        )
 
 
 def _lowest_minima(critical_ke: np.ndarray, count: int) -> np.ndarray:
@@ -121,16 +201,3 @@ def _lowest_minima(critical_ke: np.ndarray, count: int) -> np.ndarray:
     a, b, c = a[inside], b[inside], c[inside]
     vertex[inside] = b - (a - c) ** 2 / (8 * (a + c - 2 * b))
     return at[np.argsort(vertex, kind="stable")[:count]]
-
-
-def _tip(answer: BoundaryAnswers, i: int, change: float, first_frequency_hz: float) -> CriticalSpeed:
-    speed, chatter = float(answer.speed_hz[i]), float(answer.chatter_hz[i])
-    return CriticalSpeed(
-        ke=float(answer.critical_ke[i]),
-        speed_hz=speed,
-        speed_rpm=60.0 * speed,
-        speed_ratio=speed / first_frequency_hz,
-        chatter_hz=chatter,
-        lobes_per_revolution=chatter / speed,
-        error_estimate=float(answer.error_estimate[i]) + change,
-    )

@@ -1,10 +1,10 @@
-"""Screening of many blades and contacts: the smallest destabilising K_e of each, and where ([SBL] section 6)."""
+"""Screening of blades and contacts: the smallest destabilising K_e of each, and where ([SBL] section 6)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,41 +12,17 @@ from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number
-from service.lobe_tips import CriticalSpeed, deepest_lobe_tips, lobe_grid
+from service.answerer import Answerer
+from service.lobe_tips import CriticalSpeed, lobe_grid
 from service.speeds import SpeedRange, evenly_spaced, operating_range
+from service.sweep import Progress, searched
 from training.answers import EXACT, BoundaryAnswers, MapAnswers
 
 # [SBL] section 4: K_e up to 2.5e4 N/m covers the cutting forces seen in experiments.
 KE_MAX = 2.5e4
-STABLE, UNSTABLE = "stable", "unstable at some speed"
-
-Progress = Callable[[int, int, str], None]
-
-
-class Answerer(Protocol):
-    """What answers stability questions: a `training.screening.Screener`, or a `service.client.Client`."""
-
-    def boundary(
-        self,
-        blade: Blade,
-        contact: ContactConfiguration,
-        speed_hz: np.ndarray,
-        ke_max: float,
-        policy: str = "auto",
-    ) -> BoundaryAnswers:
-        """First crossing at each speed."""
-        ...
-
-    def map(
-        self,
-        blade: Blade,
-        contact: ContactConfiguration,
-        speed_hz: np.ndarray,
-        ke: np.ndarray,
-        policy: str = "auto",
-    ) -> MapAnswers:
-        """Verdicts on a grid."""
-        ...
+# With arcs the exact core answers every point of a map, at some hundredths of a second each.
+MAP_SHAPE, MAP_SHAPE_WITH_ARCS = (100, 100), (50, 50)
+STABLE, UNSTABLE, UNDECIDED = "stable", "unstable at some speed", "not decided"
 
 
 @dataclass(frozen=True)
@@ -55,10 +31,10 @@ class ScreeningResult:
 
     Attributes
     ----------
-    blade, contact_name
-        Names, as in the report's tables.
-    contact
-        Nodes, weights and arcs.
+    blade
+        The blade.
+    contact_name, contact
+        Its name in tables, and its nodes, weights and arcs.
     speed_range_hz
         Rotor speeds searched, Hz.
     critical_speeds
@@ -70,11 +46,13 @@ class ScreeningResult:
         Share of the map (speed × K_e in [0, ke_max]) that is unstable.
     verified_share
         Share of the map's points answered by the exact core.
-    boundary, map
-        What the figures are drawn from.
+    boundary
+        Over the range, up to somewhat above `ke_max`, so that no lobe below it is missed.
+    map
+        Verdicts over the range, up to `ke_max`.
     """
 
-    blade: str
+    blade: Blade = field(repr=False)
     contact_name: str
     contact: ContactConfiguration
     speed_range_hz: tuple[float, float]
@@ -92,11 +70,22 @@ class ScreeningResult:
         return self.critical_speeds[0] if self.critical_speeds else None
 
     @property
+    def proven(self) -> bool:
+        """False where the exact core answered without proof, at a tip or in the sweep."""
+        swept = self.boundary.error_estimate[self.boundary.source == EXACT]
+        return bool(np.isfinite(swept).all()) and all(tip.proven for tip in self.critical_speeds)
+
+    @property
     def verdict(self) -> str | None:
-        """`STABLE` or `UNSTABLE` against the liner's K_e; None when no liner is given."""
+        """`STABLE`, `UNSTABLE` or `UNDECIDED` against the liner's K_e; None when no liner is given."""
         if self.ke_liner is None:
             return None
-        return STABLE if self.worst is None or self.worst.ke > self.ke_liner else UNSTABLE
+        if self.worst is not None and self.worst.proven and self.worst.ke <= self.ke_liner:
+            return UNSTABLE
+        return STABLE if self.proven and self._nothing_up_to(self.ke_liner) else UNDECIDED
+
+    def _nothing_up_to(self, ke: float) -> bool:
+        return self.worst is None or self.worst.ke > ke
 
     @property
     def margin(self) -> float | None:
@@ -108,7 +97,7 @@ class ScreeningResult:
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON, without the map."""
         return {
-            "blade": self.blade,
+            "blade": self.blade.name,
             "contact_name": self.contact_name,
             "contact": self.contact.to_dict(),
             "speed_range_hz": list(self.speed_range_hz),
@@ -116,6 +105,7 @@ class ScreeningResult:
             "critical_speeds": [asdict(tip) for tip in self.critical_speeds],
             "ke_max": self.ke_max,
             "ke_liner": self.ke_liner,
+            "proven": self.proven,
             "verdict": self.verdict,
             "margin": self.margin,
             "unstable_share": self.unstable_share,
@@ -171,8 +161,9 @@ def screen(
     speed_range: SpeedRange | None = None,
     ke_max: float = KE_MAX,
     ke_liner: float | None = None,
-    map_shape: tuple[int, int] = (100, 100),
+    map_shape: tuple[int, int] | None = None,
     policy: str = "auto",
+    sweep_policy: str | None = None,
     progress: Progress | None = None,
 ) -> ScreeningReport:
     """Screen every blade under every contact.
@@ -190,9 +181,11 @@ def screen(
     ke_max, ke_liner
         Largest K_e looked at and the liner's, N/m.
     map_shape
-        Speeds and stiffnesses of each map.
+        Speeds and stiffnesses of each map; None is 100 × 100, or 50 × 50 with arcs of contact.
     policy
-        Of the maps and of the first sweep over speeds. Lobe tips are exact whatever it is.
+        Of the maps. Lobe tips are exact whatever it is.
+    sweep_policy
+        Of the sweep over speeds that finds the lobes, and that charts draw; None is `policy`.
     progress
         Called with (done, total, what is next); may raise to stop the work.
 
@@ -217,7 +210,15 @@ def screen(
     for i, (blade, name, contact, speeds) in enumerate(jobs):
         if progress is not None:
             progress(i, len(jobs), f"{blade.name}, {name}")
-        results.append(_screened(blade, name, contact, speeds, answerer, ke_max, ke_liner, map_shape, policy))
+        columns, rows = map_shape or (MAP_SHAPE if contact.permanent else MAP_SHAPE_WITH_ARCS)
+        speed_hz = evenly_spaced(*speeds, columns)
+        sweep = lobe_grid(blade, contact, speed_hz, ke_max)
+        boundary, tips = searched(answerer, blade, contact, sweep, ke_max, sweep_policy or policy)
+        verdicts = answerer.map(blade, contact, speed_hz, np.linspace(0.0, ke_max, rows), policy=policy)
+        shares = verdicts.unstable_share, verdicts.exact_share
+        results.append(
+            ScreeningResult(blade, name, contact, speeds, tips, ke_max, ke_liner, *shares, boundary, verdicts)
+        )
     if progress is not None:
         progress(len(jobs), len(jobs), "done")
     ranked = tuple(sorted(results, key=_risk))
@@ -226,48 +227,6 @@ def screen(
 
 def _range(blade: Blade, speed_range: SpeedRange | None) -> tuple[float, float]:
     return operating_range(blade) if speed_range is None else speed_range.for_blade(blade)
-
-
-def _screened(
-    blade: Blade,
-    name: str,
-    contact: ContactConfiguration,
-    speeds: tuple[float, float],
-    answerer: Answerer,
-    ke_max: float,
-    ke_liner: float | None,
-    map_shape: tuple[int, int],
-    policy: str,
-) -> ScreeningResult:
-    def exact(speed_hz: np.ndarray) -> BoundaryAnswers:
-        return answerer.boundary(blade, contact, speed_hz, ke_max, policy="exact")
-
-    grid = lobe_grid(blade, *speeds)
-    boundary = answerer.boundary(blade, contact, grid, ke_max, policy=policy)
-    tips = deepest_lobe_tips(boundary, exact, blade.first_frequency_hz)
-    if not tips and not (boundary.source == EXACT).all():
-        boundary = exact(grid)  # "None below ke_max" is never the surrogate's word alone.
-        tips = deepest_lobe_tips(boundary, exact, blade.first_frequency_hz)
-    stability_map = answerer.map(
-        blade,
-        contact,
-        evenly_spaced(*speeds, map_shape[0]),
-        np.linspace(0.0, ke_max, map_shape[1]),
-        policy=policy,
-    )
-    return ScreeningResult(
-        blade.name,
-        name,
-        contact,
-        speeds,
-        tips,
-        ke_max,
-        ke_liner,
-        stability_map.unstable_share,
-        stability_map.exact_share,
-        boundary,
-        stability_map,
-    )
 
 
 def _risk(result: ScreeningResult) -> tuple[float, float]:

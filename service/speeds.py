@@ -20,7 +20,9 @@ IDLE_SHARE, OVERSPEED_SHARE = 0.30, 1.05
 # Without a design speed, the range of [SBL] section 4, from where its lobes can be told apart.
 LOWEST_RATIO, HIGHEST_RATIO = 0.05, 0.45
 
-_SPEED = re.compile(r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)\s*(?P<unit>[a-z]*)\s*", re.I)
+_SPEED = re.compile(
+    r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf)\s*(?P<unit>[a-z]*)\s*", re.I
+)
 _HINT = "give a number with its unit, e.g. 150Hz, 9000rpm or 0.25ratio"
 
 
@@ -106,7 +108,9 @@ class SpeedRange:
         ends = text.split(":")
         if len(ends) != 2:
             raise InvalidInput(
-                field, text, "give a range LOW:HIGH with its unit, e.g. 50Hz:300Hz, 3000rpm:18000rpm, 0.05:0.33ratio"
+                field,
+                text,
+                "give a range LOW:HIGH with its unit, e.g. 50Hz:300Hz, 3000rpm:18000rpm, 0.05:0.33ratio",
             )
         units = [m["unit"] if (m := _SPEED.fullmatch(end)) else "" for end in ends]
         low = Speed.parse(ends[0], field, unit=units[1])
@@ -182,7 +186,9 @@ def operating_range(blade: Blade) -> tuple[float, float]:
         low, high = max(low, blade.speed_range_hz[0]), min(high, blade.speed_range_hz[1])
     if low >= high:
         raise InvalidInput(
-            "speed", "left out", f"blade {blade.name!r} has no usual operating range; give one, e.g. 50Hz:300Hz"
+            "speed",
+            "left out",
+            f"blade {blade.name!r} has no usual operating range; give one, e.g. 50Hz:300Hz",
         )
     return low, high
 
@@ -194,4 +200,6 @@ def evenly_spaced(low_hz: float, high_hz: float, count: int) -> np.ndarray:
 
 def evenly_timed(low_hz: float, high_hz: float, count: int) -> np.ndarray:
     """`count` rising speeds in Hz, evenly spaced in 1/Ω, in which lobes are periodic (DESIGN, fact 6)."""
-    return 1.0 / np.linspace(1.0 / low_hz, 1.0 / high_hz, count)
+    speeds = 1.0 / np.linspace(1.0 / low_hz, 1.0 / high_hz, count)
+    speeds[0], speeds[-1] = low_hz, high_hz  # not an ulp beyond the modal data
+    return speeds

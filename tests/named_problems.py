@@ -54,10 +54,13 @@ def receptance(problem: RubbingBlade) -> ContactReceptance:
 
 
 def random_problem(
-    rng: np.random.Generator, arcs: list[list[float]] | None = None, kappa: float = 0.05
+    rng: np.random.Generator,
+    arcs: list[list[float]] | None = None,
+    kappa: float = 0.05,
+    most_modes: int = 5,
 ) -> RubbingBlade:
-    """A random blade of one to five modes at three nodes."""
-    n = int(rng.integers(1, 6))
+    """A random blade of one to `most_modes` modes at three nodes."""
+    n = int(rng.integers(1, most_modes + 1))
     frequency = np.cumprod(np.r_[100.0, rng.uniform(1.3, 3.0, n - 1)])
     shape = rng.normal(size=(n, 3)) * rng.uniform(1.0, 8.0, (n, 1))
     scale = 1.0 / ((shape**2).sum(axis=1) / (2 * np.pi * frequency) ** 2).max()

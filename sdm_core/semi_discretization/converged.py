@@ -62,7 +62,7 @@ class Converged:
         # No oscillation may fall between two steps.
         mean_a, _ = equation.means(np.zeros(1), np.full(1, equation.tau))
         fastest = float(np.abs(np.linalg.eigvals(mean_a[0]).imag).max()) * equation.tau / (2 * np.pi)
-        steps = max(self.first_steps, 4 * int(np.ceil(fastest)))
+        steps = max(self.first_steps, 4 * int(np.ceil(min(fastest, self.largest_state))))
         spectra: list[np.ndarray] = []
         answer = ConvergedMultiplier(complex(np.nan, np.nan), np.inf, 0, False)
         while Averaged(steps).state_size(equation) <= self.largest_state:

@@ -83,3 +83,23 @@ def test_cases_keep_the_first_five_modes_and_count_all():
     found = case(omega, np.full(7, 1e-3), np.ones((1, 7)), 0.3)
     assert found.mode_count[0] == 7
     np.testing.assert_array_equal(found.omega[0], np.arange(1.0, MODES + 1))
+
+
+def test_each_feature_of_a_single_mode_is_what_its_name_says():
+    xi, speed = 3e-3, 0.23
+    found = features(case([2 * np.pi], [xi], [[1.0]], speed))
+    of_mode = {name: found.inputs[0, feature_names().index(f"{name}_0")].item() for name in MODE_FEATURES}
+    exact = boundary(one_mode(xi), AT_TIP, np.array([speed]), 1e3)
+    chatter_ratio = exact.chatter_hz[0]
+    phase = 2 * np.pi / speed
+    u = (chatter_ratio**2 - 1) / (2 * xi * chatter_ratio)
+    assert of_mode["sin_phase"] == pytest.approx(np.sin(phase), abs=1e-6)
+    assert of_mode["cos_phase"] == pytest.approx(np.cos(phase), abs=1e-6)
+    assert of_mode["log_decay"] == pytest.approx(np.log10(xi * phase), abs=1e-6)
+    lobe = np.log10(exact.critical_ke[0] / (2 * np.pi) ** 2)
+    assert of_mode["log_nearest_lobe"] == pytest.approx(lobe, abs=1e-6)
+    assert found.baseline.item() == pytest.approx(lobe, abs=1e-9)
+    assert of_mode["place_on_nearest_lobe"] == pytest.approx(np.arctan(u) * 4 / np.pi - 1, abs=1e-5)
+    assert of_mode["log_other_lobe"] > of_mode["log_nearest_lobe"]
+    assert of_mode["faintness"] == of_mode["log_frequency"] == 0.0
+    assert of_mode["log_damping"] == pytest.approx(np.log10(xi), abs=1e-6)

@@ -90,14 +90,14 @@ def synthetic(count, seed, noise):
 
 
 def test_calibration_takes_a_narrower_band_for_a_better_surrogate():
-    good = calibrate(*synthetic(20_000, 1, 0.5), distribution="synthetic")
-    poor = calibrate(*synthetic(20_000, 1, 6.0), distribution="synthetic")
+    good = calibrate(*synthetic(60_000, 1, 0.5), distribution="synthetic")
+    poor = calibrate(*synthetic(60_000, 1, 6.0), distribution="synthetic")
     assert good.spreads < poor.spreads <= BANDS[0]
 
 
 def test_calibration_refuses_when_no_band_keeps_the_bound():
     with pytest.raises(CalibrationFailed):
-        calibrate(*synthetic(20_000, 1, 40.0), distribution="synthetic")
+        calibrate(*synthetic(60_000, 1, 40.0), distribution="synthetic")
     with pytest.raises(CalibrationFailed):  # 600 points cannot prove 5e-4 at 95 %
         calibrate(*synthetic(600, 1, 0.1), distribution="synthetic")
 
@@ -119,7 +119,7 @@ def test_evaluation_counts_what_it_says():
     boundary = PredictedBoundary(np.log10([100.0, 100.0, 100.0, 100.0, 100.0]), np.full(5, 1e-3))
     ke = np.array([50.0, 50.0, 200.0, 200.0, 100.5])
     critical = np.array([100.0, 40.0, 101.0, 300.0, 100.0])
-    band = calibrate(*synthetic(20_000, 1, 0.5), distribution="synthetic")
+    band = calibrate(*synthetic(60_000, 1, 0.5), distribution="synthetic")
     found = evaluate(boundary, band, np.ones(5, bool), ke, critical, ke > critical, distribution="five")
     assert (found.auto.answered_stable, found.auto.false_stable) == (2, 1)
     assert (found.auto.answered_unstable, found.auto.false_unstable) == (2, 1)

@@ -1,0 +1,65 @@
+"""The application: settings in, FastAPI out."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TypedDict
+
+from fastapi import FastAPI
+from fastapi_offline import FastAPIOffline
+
+from sdm_core.version import __version__
+from service import access_log, errors, openapi
+from service.answerer import Answerer
+from service.desk import Desk
+from service.routes import health, models, stability
+from service.settings import Settings
+
+DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
+which cutting stiffness on? Under `policy: auto` a surrogate answers where it is sure and inside its domain,
+the exact core elsewhere; every point says which, and why."""
+
+
+class State(TypedDict):
+    """What the lifespan gives every request."""
+
+    desk: Desk
+
+
+def create_app(settings: Settings | None = None, *, screener: Answerer | None = None) -> FastAPI:
+    """The service.
+
+    Parameters
+    ----------
+    settings
+        Read from the environment when left out.
+    screener
+        What answers; left out, the shipped model with the exact core behind it.
+    """
+    settings = settings or Settings()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[State]:
+        access_log.configure(settings.log_level)
+        yield {"desk": Desk.opened(settings, screener)}
+
+    # Not plain FastAPI, whose /docs loads its scripts from the internet.
+    app: FastAPI = FastAPIOffline(
+        title="rubscreen",
+        version=__version__,
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        redirect_slashes=False,
+        docs_url="/docs",
+        redoc_url=None,
+        static_url="/docs/assets",
+        swagger_ui_parameters={"validatorUrl": None},
+    )
+    app.include_router(stability.router)
+    app.include_router(models.router)
+    app.include_router(health.router)
+    errors.install(app)
+    openapi.install(app)
+    app.add_middleware(access_log.AccessLog)
+    return app

@@ -1,0 +1,137 @@
+"""From what is typed to blades, contacts, speeds, and whatever answers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sdm_core.blade import EXAMPLES, Blade, example_blade, read_blade
+from sdm_core.contact import ContactConfiguration
+from sdm_core.errors import InvalidInput
+from sdm_core.validation import KE_LIMIT, number
+from service.speeds import SpeedRange, operating_range
+
+if TYPE_CHECKING:
+    from service.answerer import Answerer
+
+LARGEST_GRID = 4000
+
+
+def blade_from(text: str) -> Blade:
+    """A blade file, or one of the shipped examples by name."""
+    if text in EXAMPLES and not Path(text).exists():
+        return example_blade(text)
+    if not Path(text).exists() and not Path(text).suffix:
+        raise InvalidInput("BLADE", text, f"give a blade file or one of {', '.join(EXAMPLES)}")
+    return read_blade(text)
+
+
+def contact_from(
+    nodes: str | None, weights: str | None, arcs: str | None, blade: Blade
+) -> ContactConfiguration:
+    """The contact as typed; without nodes or weights, the leading edge."""
+    if nodes is not None and weights is not None:
+        raise InvalidInput("--nodes", nodes, "give either --nodes or --weights, not both")
+    if weights is not None:
+        chosen = _weights(weights)
+    else:
+        names = [blade.tip_nodes[0]] if nodes is None else [part.strip() for part in nodes.split(",")]
+        for name in names:
+            if not name or names.count(name) > 1:
+                raise InvalidInput("--nodes", str(nodes), "name each tip node once, e.g. LE,TE")
+        chosen = dict.fromkeys(names, 1.0)
+    contact = ContactConfiguration(chosen, None if arcs is None else _arcs(arcs))
+    contact.weight_vector(blade.tip_nodes)
+    return contact
+
+
+def contacts_from(
+    nodes: Sequence[str], weights: Sequence[str], arcs: str | None, blades: Sequence[Blade]
+) -> dict[str, ContactConfiguration] | None:
+    """One contact for each --nodes and --weights, by what was typed; None for the usual three."""
+    if not nodes and not weights:
+        if arcs is not None:
+            raise InvalidInput("--arcs", arcs, "say which nodes too, e.g. --nodes LE --nodes TE")
+        return None
+    named = {text: contact_from(text, None, arcs, blades[0]) for text in nodes}
+    named.update({text: contact_from(None, text, arcs, blades[0]) for text in weights})
+    return named
+
+
+def speeds_from(text: str | None, blade: Blade) -> tuple[float, float]:
+    """(low, high) in Hz."""
+    return operating_range(blade) if text is None else SpeedRange.parse(text, "--speed").for_blade(blade)
+
+
+def grid_from(text: str, field: str = "--grid") -> tuple[int, int]:
+    """Speeds and stiffnesses of a map, typed as ``200x200``."""
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(part.strip().isdecimal() for part in parts):
+        raise InvalidInput(field, text, "give SPEEDSxSTIFFNESSES, e.g. 200x200")
+    shape = int(parts[0]), int(parts[1])
+    if not all(2 <= count <= LARGEST_GRID for count in shape):
+        raise InvalidInput(field, text, f"give 2 to {LARGEST_GRID} each way")
+    return shape
+
+
+def check_stiffnesses(ke_max: float, ke_liner: float | None) -> None:
+    """Refuse a --ke-max or --ke-liner that no liner has."""
+    number("--ke-max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+    if ke_liner is not None:
+        number("--ke-liner", ke_liner, 0.0, ke_max, "N/m (--ke-max)", open_low=True)
+
+
+def speed_count(count: int) -> int:
+    """How many speeds of a boundary."""
+    if not 2 <= count <= LARGEST_GRID:
+        raise InvalidInput("--speeds", count, f"give 2 to {LARGEST_GRID}")
+    return count
+
+
+def answerer_from(url: str | None, models: str | None, policy: str) -> Answerer:
+    """A client of the service at `url`, or a model in this process; under `exact`, no model.
+
+    Raises
+    ------
+    InvalidInput, DamagedFile
+        When the model cannot be loaded.
+    """
+    if url is not None:
+        if models is not None:
+            raise InvalidInput("--models", models, "leave it out with --url: the service has its own")
+        from service.client import Client
+
+        return Client(url)
+    from training.screening import Screener
+
+    if policy == "exact":
+        return Screener(None)
+    return Screener.default() if models is None else Screener.default(Path(models))
+
+
+def _weights(text: str) -> dict[str, float]:
+    chosen: dict[str, float] = {}
+    for part in text.split(","):
+        node, equals, weight = (piece.strip() for piece in part.partition("="))
+        if not equals or not node or node in chosen:
+            raise InvalidInput("--weights", text, "give each node once with its weight, e.g. LE=1,TE=0.5")
+        chosen[node] = _number("--weights", weight, text)
+    return chosen
+
+
+def _arcs(text: str) -> list[tuple[float, float]]:
+    arcs = []
+    for part in text.split(","):
+        ends = part.split(":")
+        if len(ends) != 2:
+            raise InvalidInput("--arcs", text, "give START:END in revolutions, e.g. 0:0.25,0.5:0.75")
+        arcs.append((_number("--arcs", ends[0], text), _number("--arcs", ends[1], text)))
+    return arcs
+
+
+def _number(field: str, part: str, text: str) -> float:
+    try:
+        return float(part)
+    except ValueError:
+        raise InvalidInput(field, text, f"give a number instead of {part.strip()!r}") from None

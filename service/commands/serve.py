@@ -1,0 +1,81 @@
+"""`rubscreen serve`: the REST service."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def run(
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for every network.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free one.")] = 8000,
+    models: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Answer from the active model of this folder instead of the shipped one.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Run the REST service until it is interrupted. Its settings are RUBSCREEN_... environment variables."""
+    import uvicorn
+
+    from service.app import create_app
+
+    settings = _settings(models)
+    listening = _listening(host, port)
+    app = create_app(settings)
+    shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
+    typer.echo(
+        f"rubscreen: listening on {shown}\n  {shown}/docs    try it in a browser\n  {shown}/readyz  ready?"
+    )
+    typer.echo("  stop with Ctrl-C")
+    config = uvicorn.Config(
+        app,
+        log_level=settings.log_level.lower(),
+        access_log=False,
+        timeout_graceful_shutdown=settings.shutdown_s,
+    )
+    with listening:
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def _settings(models: str | None) -> Settings:
+    from pydantic import ValidationError
+
+    from sdm_core.errors import InvalidInput
+    from service.settings import Settings
+
+    try:
+        return Settings() if models is None else Settings(models_folder=Path(models))
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        name = "RUBSCREEN_" + "_".join(str(part) for part in fault["loc"]).upper()
+        raise InvalidInput(name, fault["input"], fault["msg"]) from None
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """A bound socket, so that a port in use is refused before anything is loaded."""
+    from sdm_core.errors import InvalidInput
+
+    if not 0 <= port <= 65535:
+        raise InvalidInput("--port", port, "give a port from 0 to 65535")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+    except OSError as error:
+        listening.close()
+        field, value = ("--host", host) if isinstance(error, socket.gaierror) else ("--port", str(port))
+        raise InvalidInput(
+            field, value, f"give a free port and an address of this machine ({error.strerror})"
+        ) from None
+    return listening

@@ -1,0 +1,70 @@
+"""Results as tables for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from service.screen import UNSTABLE
+
+if TYPE_CHECKING:
+    from service.lobe_tips import CriticalSpeed
+    from service.screen import ScreeningReport
+
+
+def critical_speeds_table(title: str, tips: Sequence[CriticalSpeed]) -> Table:
+    """Tips of lobes, smallest K_e first."""
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for heading in ("K_e [N/m]", "speed [Hz]", "rpm", "ratio", "chatter [Hz]", "wear lobes"):
+        table.add_column(heading, justify="right")
+    for tip in tips:
+        table.add_row(
+            f"{tip.ke:,.1f}" if tip.proven else f"{tip.ke:,.1f} (not proven)",
+            f"{tip.speed_hz:.3f}",
+            f"{tip.speed_rpm:,.1f}",
+            f"{tip.speed_ratio:.4f}",
+            f"{tip.chatter_hz:.2f}",
+            f"{tip.lobes_per_revolution:.2f}",
+        )
+    return table
+
+
+def ranking_table(report: ScreeningReport) -> Table:
+    """One row a blade and contact, safest first; about 90 characters wide."""
+    judged = any(row.verdict for row in report.results)
+    table = Table(
+        title="Ranking, safest first",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("blade", overflow="fold")
+    table.add_column("contact", overflow="fold")
+    for heading in ("K_e [N/m]", "at rpm", "chatter [Hz]", "lobes", "unstable", "verified"):
+        table.add_column(heading, justify="right")
+    if judged:
+        table.add_column("verdict", no_wrap=True)
+    for row in report.results:
+        worst = row.worst
+        where = (f"> {row.ke_max:,.0f}", "-", "-", "-")
+        if worst is not None:
+            proven = "" if worst.proven else " (not proven)"
+            where = (
+                f"{worst.ke:,.0f}{proven}",
+                f"{worst.speed_rpm:,.0f}",
+                f"{worst.chatter_hz:.1f}",
+                f"{worst.lobes_per_revolution:.1f}",
+            )
+        shares = (f"{row.unstable_share:.1%}", f"{row.verified_share:.1%}")
+        verdict = () if not judged else (_verdict(row.verdict, row.margin),)
+        table.add_row(row.blade.name, row.contact_name, *where, *shares, *verdict)
+    return table
+
+
+def _verdict(verdict: str | None, margin: float | None) -> str:
+    word = "unstable" if verdict == UNSTABLE else f"{verdict}"
+    return word if margin is None else f"{word} {margin:+.0%}"

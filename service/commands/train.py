@@ -1,0 +1,125 @@
+"""`rubscreen train`: a new surrogate from labels of the exact core."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.commands.options import OUTPUT
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from training.evaluation import Evaluation
+
+SIZE = "Size"
+
+
+def run(
+    folder: Annotated[
+        str,
+        typer.Argument(metavar="FOLDER", help="Where models are kept; each gets a folder of its own in it."),
+    ] = "out/models",
+    seed: Annotated[int, typer.Option(help="Of everything drawn by chance.", min=0)] = 2013,
+    threads: Annotated[int, typer.Option(help="Labelling processes and torch threads.", min=1)] = 2,
+    designs: Annotated[
+        int, typer.Option(help="Blades in the training set.", min=64, rich_help_panel=SIZE)
+    ] = 32_768,
+    speeds_each: Annotated[
+        int, typer.Option(help="Rotor speeds of each blade.", min=1, rich_help_panel=SIZE)
+    ] = 6,
+    epochs: Annotated[
+        int, typer.Option(help="Passes over the training set.", min=1, rich_help_panel=SIZE)
+    ] = 40,
+    points: Annotated[
+        int,
+        typer.Option(
+            help="Independent points to calibrate on, and as many to evaluate on.",
+            min=10_000,
+            rich_help_panel=SIZE,
+        ),
+    ] = 20_000,
+    activate: Annotated[bool, typer.Option(help="Make it the folder's active model.")] = True,
+    json: Annotated[
+        str | None,
+        typer.Option(
+            "--json",
+            metavar="PATH",
+            help="Write its figures; - for stdout.",
+            rich_help_panel=OUTPUT,
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Sample the design space, label it with the exact core, fit, calibrate and evaluate a surrogate.
+
+    Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
+    """
+    from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
+    from training.calibration import CalibrationFailed
+    from training.fit import FitSettings
+    from training.pipeline import TrainingSettings, train
+
+    check_writable(json=json, folder=f"{folder}/active")
+    settings = TrainingSettings(
+        designs=designs,
+        speeds_each=speeds_each,
+        calibration_points=points,
+        evaluation_points=points,
+        seed=seed,
+        threads=threads,
+        fit=FitSettings(epochs=epochs),
+    )
+    console = console_beside(json)
+    try:
+        with progress_bar("train") as show:
+            made = train(
+                Path(folder),
+                settings,
+                activate=activate,
+                progress=lambda stage, done, of, remark: show(done, of, f"{stage} {remark}"),
+            )
+    except CalibrationFailed as error:
+        typer.echo(
+            f"rubscreen: no model was written: {error}. Give it more designs, epochs or points", err=True
+        )
+        raise typer.Exit(1) from None
+    console.print(_figures(made.evaluation))
+    console.print(
+        f"boundary error: median {made.evaluation.median_boundary_error:.2%}, "
+        f"99 of 100 below {made.evaluation.p99_boundary_error:.2%}"
+    )
+    console.print(f"[dim]seconds: {', '.join(f'{k} {v:g}' for k, v in made.seconds.items())}[/dim]")
+    console.print(f"model {made.model.id} in {folder}{', now active' if activate else ''}")
+    if json:
+        report = {"model": made.model.id, "seconds": made.seconds, "evaluation": made.evaluation.to_dict()}
+        write_json(json, report, indent=True)
+
+
+def _figures(evaluation: Evaluation) -> Table:
+    from rich.table import Table
+
+    table = Table(
+        title=f"On an independent sample of {evaluation.distribution}",
+        title_justify="left",
+        title_style="bold",
+    )
+    table.add_column("")
+    for heading in ("points", "verified", "false stable", "false unstable"):
+        table.add_column(heading, justify="right")
+    for name, found in (
+        ("auto", evaluation.auto),
+        ("auto, near the boundary", evaluation.auto_hard),
+        ("surrogate alone", evaluation.alone),
+        ("alone, near the boundary", evaluation.alone_hard),
+    ):
+        table.add_row(
+            name,
+            f"{found.points:,}",
+            f"{found.exact_share:.1%}",
+            f"{found.false_stable} of {found.answered_stable:,}",
+            f"{found.false_unstable} of {found.answered_unstable:,}",
+        )
+    return table

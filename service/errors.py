@@ -1,0 +1,140 @@
+"""Every error as a problem document (RFC 9457), from one table of exceptions."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+
+from sdm_core.errors import DamagedFile, InvalidInput, ModesNotTracked, OutOfSpeedRange, TooMuchWork
+from service.limits import Busy, SlowBody, TooLarge
+
+PROBLEM_JSON = "application/problem+json"
+logger = logging.getLogger("rubscreen.service")
+
+
+class NotReady(InvalidInput):
+    """The service lacks something it needs for this answer."""
+
+
+class NotAcceptable(InvalidInput):
+    """No form of the answer is one the client takes."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: the last part of its `type`, its title and its HTTP status."""
+
+    name: str
+    title: str
+    status: int
+    retry_after_s: int | None = None
+
+    @property
+    def type(self) -> str:
+        """The problem's `type`: a name, so that nothing has to be reachable."""
+        return f"urn:rubscreen:problem:{self.name}"
+
+
+# The first class that fits counts, so the narrower ones stand first.
+KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
+    (TooLarge, Kind("too-large", "The request is too large", 413)),
+    (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
+    (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),
+    (Busy, Kind("busy", "The service is busy", 503, retry_after_s=5)),
+    (NotReady, Kind("not-ready", "The service is not ready to answer this", 503, retry_after_s=30)),
+    (DamagedFile, Kind("damaged-file", "A file of the service is damaged", 503)),
+    (NotAcceptable, Kind("not-acceptable", "No such form of the answer", 406)),
+    (OutOfSpeedRange, Kind("out-of-speed-range", "The modal data do not reach this speed", 422)),
+    (ModesNotTracked, Kind("modes-not-tracked", "Modes cannot be followed between the states", 422)),
+    (InvalidInput, Kind("invalid-input", "The request cannot be used", 422)),
+)
+
+
+def kind_of(error: InvalidInput) -> Kind:
+    """The kind of problem an exception of the core or of the service is."""
+    return next(kind for exception, kind in KINDS if isinstance(error, exception))
+
+
+class Problem(Response):
+    """A problem document.
+
+    Beside the members of RFC 9457 it carries `field` (where, as the caller wrote it), `value` (what
+    was found there), `remedy` (what to do) and `request_id` (to find the request in the log).
+    """
+
+    media_type = PROBLEM_JSON
+
+    def __init__(
+        self,
+        kind: Kind,
+        scope: Mapping[str, Any],
+        field: str,
+        value: str,
+        remedy: str,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        document = {
+            "type": kind.type,
+            "title": kind.title,
+            "status": kind.status,
+            "detail": f"{field} = {value}: {remedy}",
+            "instance": scope["path"],
+            "field": field,
+            "value": value,
+            "remedy": remedy,
+            "request_id": scope.get("state", {}).get("request_id"),
+        }
+        extra = dict(headers or {})
+        if kind.retry_after_s is not None:
+            extra["Retry-After"] = str(kind.retry_after_s)
+        # The standard encoder, in ASCII: what it quotes may hold characters no UTF-8 can carry.
+        super().__init__(json.dumps(document).encode(), kind.status, extra)
+
+
+def unexpected(scope: Mapping[str, Any], error: Exception) -> Problem:
+    """The problem that answers a fault of the service itself; what it was stays in the log."""
+    kind = Kind("internal-error", "The service failed", 500)
+    return Problem(
+        kind, scope, "service", type(error).__name__, "report it with the request_id and the request's body"
+    )
+
+
+def _answer_invalid(request: Request, error: Exception) -> Response:
+    assert isinstance(error, InvalidInput)
+    return Problem(kind_of(error), request.scope, error.field, error.value, error.remedy)
+
+
+def _answer_http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    headers = error.headers or {}
+    if error.status_code == HTTPStatus.NOT_FOUND:
+        kind = Kind("no-such-path", "There is nothing at this path", 404)
+        return Problem(kind, request.scope, "path", request.url.path, "see /docs for the paths there are")
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        kind = Kind("method-not-allowed", "The path does not take this method", 405)
+        remedy = f"use {headers.get('Allow', 'another method')}"
+        return Problem(kind, request.scope, "method", request.method, remedy, headers)
+    kind = Kind("http-error", HTTPStatus(error.status_code).phrase, error.status_code)
+    return Problem(kind, request.scope, "request", str(error.detail), "see /docs for what is taken", headers)
+
+
+def _answer_gone(request: Request, error: Exception) -> Response:
+    # Nobody reads this; it keeps a client that hangs up from being logged as a fault of ours.
+    kind = Kind("body-cut-off", "The connection ended before the body did", 400)
+    return Problem(kind, request.scope, "body", "cut off", "send the whole body")
+
+
+def install(app: FastAPI) -> None:
+    """Answer every exception of the table, and the framework's own, with a problem document."""
+    app.add_exception_handler(InvalidInput, _answer_invalid)
+    app.add_exception_handler(HTTPException, _answer_http)
+    app.add_exception_handler(ClientDisconnect, _answer_gone)

@@ -1,0 +1,73 @@
+"""The OpenAPI document; ``python -m service.openapi`` prints the one committed as ``docs/openapi.json``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from service.errors import PROBLEM_JSON
+from service.question_schemas import BLADE, CONTACT
+from service.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.schemas import ProblemDocument
+
+Json = dict[str, Any]
+
+_REF = "#/components/schemas/{model}"
+_MEANINGS = {
+    406: "No form of the answer is one the client accepts.",
+    408: "The body did not arrive in time.",
+    413: "The body, an array or the number of points is over the limit.",
+    422: "The request cannot be used; the problem names the field, its value and the remedy.",
+    500: "A fault of the service.",
+    503: "The service cannot answer now.",
+}
+
+
+def problems(*statuses: int) -> dict[int | str, Json]:
+    """OpenAPI responses with a problem document, for a route."""
+    schema = {"$ref": _REF.format(model=ProblemDocument.__name__)}
+    return {
+        status: {"description": _MEANINGS[status], "content": {PROBLEM_JSON: {"schema": schema}}}
+        for status in statuses
+    }
+
+
+def request_body(question: type[BaseModel], example: Json) -> Json:
+    """OpenAPI request body, for a route that parses it itself."""
+    content = {"schema": {"$ref": _REF.format(model=question.__name__)}, "example": example}
+    return {"requestBody": {"required": True, "content": {"application/json": content}}}
+
+
+def install(app: FastAPI) -> None:
+    """Add to the document what routes that parse their own bodies leave out."""
+    generate = app.openapi
+
+    def with_components() -> Json:
+        if app.openapi_schema is None:
+            generate()["components"]["schemas"] |= _components()
+        assert app.openapi_schema is not None
+        return app.openapi_schema
+
+    app.openapi = with_components  # type: ignore[method-assign]
+
+
+def _components() -> Json:
+    described = (PointsQuestion, BoundaryQuestion, MapQuestion, ProblemDocument)
+    _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
+    schemas = found["$defs"]
+    parts = {"blade": "Blade", "contact": "Contact"}
+    for schema in schemas.values():
+        for field in parts.keys() & schema["properties"].keys():
+            schema["properties"][field] = {"$ref": _REF.format(model=parts[field])}
+    return schemas | {"Blade": BLADE, "Contact": CONTACT}
+
+
+if __name__ == "__main__":
+    from service.app import create_app
+
+    sys.stdout.write(json.dumps(create_app().openapi(), indent=1) + "\n")

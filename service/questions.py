@@ -1,0 +1,184 @@
+"""What a client asks: the bodies of the POST requests, parsed into the core's own objects."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
+
+from sdm_core.blade import SCHEMA, Blade, blade_from_dict
+from sdm_core.contact import ContactConfiguration
+from sdm_core.errors import InvalidInput
+from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
+from service.limits import TooLarge, check_blade_size, check_length, check_reach
+from service.question_schemas import BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
+from service.settings import Settings
+from training.answers import POLICIES
+
+
+def _blade(value: Any, info: ValidationInfo) -> Blade:
+    if not isinstance(value, dict):
+        raise InvalidInput("blade", value, f"give an object with schema {SCHEMA!r}")
+    check_blade_size(value, _settings(info))
+    try:
+        return blade_from_dict(value)
+    except InvalidInput as error:
+        raise error.under("blade") from None
+
+
+def _contact(value: Any, info: ValidationInfo) -> ContactConfiguration:
+    if isinstance(value, dict):
+        check_length(
+            "contact.weights", value.get("weights"), _settings(info).max_tip_nodes, "name fewer nodes"
+        )
+        check_length("contact.arcs", value.get("arcs"), _settings(info).max_arcs, "join arcs")
+    return ContactConfiguration.from_dict(value)
+
+
+def _speeds(value: Any, info: ValidationInfo) -> np.ndarray:
+    check_length("speed_hz", value, _settings(info).max_points)
+    return speeds("speed_hz", value)
+
+
+def _boundary_speeds(value: Any, info: ValidationInfo) -> np.ndarray:
+    check_length("speed_hz", value, _settings(info).max_boundary_speeds)
+    return speeds("speed_hz", value)
+
+
+def _ke(value: Any, info: ValidationInfo) -> np.ndarray:
+    check_length("ke", value, _settings(info).max_points)
+    return stiffnesses("ke", value)
+
+
+def _ke_max(value: Any) -> float:
+    return number("ke_max", value, 0.0, KE_LIMIT, "N/m", open_low=True)
+
+
+def _policy(value: Any) -> str:
+    if not isinstance(value, str) or value not in POLICIES:
+        raise InvalidInput("policy", value, f"give one of {', '.join(POLICIES)}")
+    return value
+
+
+def _settings(info: ValidationInfo) -> Settings:
+    assert isinstance(info.context, Settings)
+    return info.context
+
+
+SpeedArray = Annotated[np.ndarray, PlainValidator(_speeds), WithJsonSchema(SPEEDS)]
+BoundarySpeedArray = Annotated[np.ndarray, PlainValidator(_boundary_speeds), WithJsonSchema(SPEEDS)]
+KeArray = Annotated[np.ndarray, PlainValidator(_ke), WithJsonSchema(KE)]
+
+
+class Question(BaseModel, ABC):
+    """What every question holds: a blade, its contact, rotor speeds, and who may answer."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    blade: Annotated[Blade, PlainValidator(_blade), WithJsonSchema(BLADE)]
+    contact: Annotated[ContactConfiguration, PlainValidator(_contact), WithJsonSchema(CONTACT)]
+    speed_hz: SpeedArray
+    policy: Annotated[str, PlainValidator(_policy), WithJsonSchema(POLICY)] = "auto"
+
+    @classmethod
+    def read(cls, data: Any, settings: Settings) -> Self:
+        """The question in a parsed body.
+
+        Raises
+        ------
+        InvalidInput
+            For the first field that cannot be used.
+        TooLarge
+            When a list is over the limits of `settings`.
+        """
+        if not isinstance(data, dict):
+            raise InvalidInput("body", data, f"send a JSON object with {', '.join(cls.model_fields)}")
+        try:
+            return cls.model_validate(data, context=settings)
+        except ValidationError as error:
+            raise _first_fault(error, list(cls.model_fields)) from None
+
+    @model_validator(mode="after")
+    def _the_core_can_reach_it(self, info: ValidationInfo) -> Self:
+        field, ke = self._largest_ke()
+        check_reach(self.blade, self.contact, self.speed_hz, field, ke, _settings(info))
+        return self
+
+    @abstractmethod
+    def _largest_ke(self) -> tuple[str, float]:
+        """The largest stiffness asked about, and its field."""
+
+
+class KeQuestion(Question):
+    """A question about given stiffnesses."""
+
+    ke: KeArray
+
+    def _largest_ke(self) -> tuple[str, float]:
+        i = int(np.argmax(self.ke))
+        return f"ke[{i}]", float(self.ke[i])
+
+
+class PointsQuestion(KeQuestion):
+    """Is the blade stable at these points? Entry i of `speed_hz` goes with entry i of `ke`."""
+
+    @model_validator(mode="after")
+    def _as_many_speeds_as_stiffnesses(self) -> Self:
+        if len(self.ke) != len(self.speed_hz):
+            count = len(self.speed_hz)
+            raise InvalidInput("ke", f"{len(self.ke)} numbers", f"give one a speed: {count}, as in speed_hz")
+        return self
+
+
+class BoundaryQuestion(Question):
+    """From which stiffness on is the blade unstable at these speeds?"""
+
+    speed_hz: BoundarySpeedArray
+    ke_max: Annotated[float, PlainValidator(_ke_max), WithJsonSchema(KE_MAX)]
+
+    def _largest_ke(self) -> tuple[str, float]:
+        return "ke_max", self.ke_max
+
+
+class MapQuestion(KeQuestion):
+    """Where in the plane of speed and stiffness is the blade stable?"""
+
+    @model_validator(mode="after")
+    def _not_too_many_points(self, info: ValidationInfo) -> Self:
+        points, most = len(self.speed_hz) * len(self.ke), _settings(info).max_points
+        if points > most:
+            found = f"{len(self.speed_hz)} speeds x {len(self.ke)} stiffnesses = {points} points"
+            raise TooLarge("speed_hz x ke", found, f"give at most {most} points: split the map by speed")
+        return self
+
+    def check_chartable(self) -> None:
+        """Raise `InvalidInput` when an axis has one value only, or does not rise."""
+        for field, values in (("speed_hz", self.speed_hz), ("ke", self.ke)):
+            if len(values) < 2 or (np.diff(values) <= 0).any():
+                remedy = "give two or more rising values for a chart, or accept application/json"
+                raise InvalidInput(field, values.tolist(), remedy)
+
+
+def _first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
+    """The first of pydantic's findings as the core would have said it."""
+    fault = error.errors(include_url=False)[0]
+    cause = fault.get("ctx", {}).get("error")
+    if isinstance(cause, InvalidInput):
+        return cause
+    field = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "missing":
+        return InvalidInput(field, "missing", f"give {field}; the fields are {', '.join(known)}")
+    if fault["type"] == "extra_forbidden":
+        return InvalidInput(field, fault["input"], f"leave it out: the fields are {', '.join(known)}")
+    return InvalidInput(field, fault["input"], fault["msg"])

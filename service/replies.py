@@ -1,0 +1,137 @@
+"""Answers on the wire and back: JSON (NaN as null) and npz."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from typing import Any
+
+import numpy as np
+import orjson
+
+from sdm_core.errors import DamagedFile
+from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+
+Json = dict[str, Any]
+
+_TRUTH = np.array([False, True, None], dtype=object)
+_POINT_FLOATS = (
+    "unstable_probability",
+    "spectral_radius",
+    "growth_per_revolution",
+    "chatter_hz",
+    "error_estimate",
+)
+_BOUNDARY_FLOATS = ("critical_ke", "chatter_hz", "error_estimate")
+_LABELS = ("source", "reason")
+_MAP_ARRAYS = ("speed_hz", "ke", "stable", "unstable_probability", *_LABELS)
+
+
+def to_json(document: Json) -> bytes:
+    """JSON in which every NaN, in numpy arrays too, is null."""
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def points_to_dict(answers: PointAnswers) -> Json:
+    """The reply of ``POST /v1/stability``."""
+    return {"stable": _truths(answers.stable), **_columns(answers, _POINT_FLOATS), **_origin(answers)}
+
+
+def points_from_dict(reply: Json, speed_hz: np.ndarray, ke: np.ndarray) -> PointAnswers:
+    """The answers in a reply of ``POST /v1/stability``."""
+    floats = _floats(reply, ("stable", *_POINT_FLOATS))
+    return PointAnswers(speed_hz=speed_hz, ke=ke, **floats, **_origin_from(reply))
+
+
+def boundary_to_dict(answers: BoundaryAnswers) -> Json:
+    """The reply of ``POST /v1/boundary``."""
+    return {
+        **_columns(answers, _BOUNDARY_FLOATS),
+        "unstable_ke": answers.unstable_ke,
+        **_origin(answers),
+    }
+
+
+def boundary_from_dict(reply: Json, speed_hz: np.ndarray, ke_max: float) -> BoundaryAnswers:
+    """The answers in a reply of ``POST /v1/boundary``."""
+    floats = _floats(reply, _BOUNDARY_FLOATS)
+    intervals = tuple(
+        None if found is None else tuple((float(low), float(high)) for low, high in found)
+        for found in reply["unstable_ke"]
+    )
+    return BoundaryAnswers(
+        speed_hz=speed_hz, ke_max=ke_max, unstable_ke=intervals, **floats, **_origin_from(reply)
+    )
+
+
+def map_to_dict(answers: MapAnswers) -> Json:
+    """The reply of ``POST /v1/map``."""
+    return {
+        **_columns(answers, ("speed_hz", "ke")),
+        "stable": _truths(answers.stable),
+        **_columns(answers, ("unstable_probability",)),
+        **_origin(answers),
+        "exact_share": answers.exact_share,
+        "unstable_share": answers.unstable_share,
+    }
+
+
+def map_from_dict(reply: Json) -> MapAnswers:
+    """The answers in a reply of ``POST /v1/map``."""
+    floats = _floats(reply, ("speed_hz", "ke", "stable", "unstable_probability"))
+    return MapAnswers(**floats, **_origin_from(reply))
+
+
+def map_to_npz(answers: MapAnswers) -> bytes:
+    """The map as a compressed npz: its arrays, and `model` ('' for none) and `solver` as texts."""
+    buffer = io.BytesIO()
+    arrays: Json = {name: np.asarray(getattr(answers, name)) for name in _MAP_ARRAYS}
+    arrays |= {name: arrays[name].astype(str) for name in _LABELS}
+    np.savez_compressed(
+        buffer, **arrays, model=np.array(answers.model or ""), solver=np.array(answers.solver)
+    )
+    return buffer.getvalue()
+
+
+def map_from_npz(content: bytes) -> MapAnswers:
+    """The answers in the npz form of a map.
+
+    Raises
+    ------
+    DamagedFile
+        When it is not such a file.
+    """
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as npz:
+            arrays = {name: npz[name] for name in _MAP_ARRAYS}
+            model, solver = str(npz["model"]), str(npz["solver"])
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise DamagedFile("map", f"{len(content)} bytes", f"ask for it again ({error})") from None
+    return MapAnswers(**arrays, model=model or None, solver=solver)
+
+
+def _truths(stable: np.ndarray) -> list:
+    """1.0, 0.0 and NaN as true, false and null."""
+    return _TRUTH[np.where(np.isnan(stable), 2, stable == 1.0).astype(int)].tolist()
+
+
+def _columns(answers: Any, names: tuple[str, ...]) -> Json:
+    return {name: np.ascontiguousarray(getattr(answers, name), dtype=float) for name in names}
+
+
+def _origin(answers: PointAnswers | BoundaryAnswers | MapAnswers) -> Json:
+    return {
+        "source": answers.source.tolist(),
+        "reason": answers.reason.tolist(),
+        "model": answers.model,
+        "solver": answers.solver,
+    }
+
+
+def _origin_from(reply: Json) -> Json:
+    labels = {name: np.array(reply[name], dtype=str) for name in _LABELS}
+    return {**labels, "model": reply["model"], "solver": reply["solver"]}
+
+
+def _floats(reply: Json, names: tuple[str, ...]) -> Json:
+    return {name: np.array(reply[name], dtype=float) for name in names}  # None becomes NaN, true 1.0

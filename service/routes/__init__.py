@@ -1,0 +1,1 @@
+"""The endpoints: each thin, over functions that know no web framework."""

@@ -1,0 +1,18 @@
+"""``GET /v1/models``."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from starlette.requests import Request
+
+from service.openapi import problems
+from service.routes.request import the_desk
+from service.schemas import Model, Models
+
+router = APIRouter(prefix="/v1", tags=["models"])
+
+
+@router.get("/models", responses=problems(500))
+def models(request: Request) -> Models:  # not async: it reads files
+    """The surrogates there are, the one that answers first."""
+    return Models(models=[Model(id=m.id, active=m.active, card=m.card) for m in the_desk(request).models()])

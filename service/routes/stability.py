@@ -1,0 +1,105 @@
+"""``POST /v1/stability``, ``/v1/boundary``, ``/v1/map``."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from starlette.requests import Request
+from starlette.responses import Response
+
+from service import replies
+from service.answerer import Answerer
+from service.body import parsed
+from service.negotiation import best_form
+from service.openapi import problems, request_body
+from service.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
+from service.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.routes.request import TheBody, the_desk
+from service.schemas import BoundaryReply, MapReply, PointsReply
+from training.answers import MapAnswers
+
+JSON, NPZ, BYTES, PNG = "application/json", "application/x-npz", "application/octet-stream", "image/png"
+MAP_FORMS = (JSON, NPZ, BYTES, PNG)
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+
+router = APIRouter(prefix="/v1", tags=["stability"])
+
+
+@router.post(
+    "/stability",
+    response_model=PointsReply,
+    openapi_extra=request_body(PointsQuestion, POINTS_EXAMPLE),
+    responses=problems(408, 413, 422, 500, 503),
+)
+async def is_it_stable(request: Request, body: TheBody) -> Response:
+    """Is the blade stable at these points (speed, K_e)?"""
+    desk = the_desk(request)
+
+    def answer() -> bytes:
+        ask = PointsQuestion.read(parsed(body), desk.settings)
+        answerer = desk.answerer(ask.policy)
+        found = answerer.points(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy)
+        return replies.to_json(replies.points_to_dict(found))
+
+    return Response(await desk.work.run(answer), media_type=JSON)
+
+
+@router.post(
+    "/boundary",
+    response_model=BoundaryReply,
+    openapi_extra=request_body(BoundaryQuestion, BOUNDARY_EXAMPLE),
+    responses=problems(408, 413, 422, 500, 503),
+)
+async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
+    """From which K_e on is the blade unstable at these speeds?"""
+    desk = the_desk(request)
+
+    def answer() -> bytes:
+        ask = BoundaryQuestion.read(parsed(body), desk.settings)
+        answerer = desk.answerer(ask.policy)
+        found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy)
+        return replies.to_json(replies.boundary_to_dict(found))
+
+    return Response(await desk.work.run(answer), media_type=JSON)
+
+
+@router.post(
+    "/map",
+    response_model=MapReply,
+    openapi_extra=request_body(MapQuestion, MAP_EXAMPLE),
+    responses={
+        200: {"content": {NPZ: _BINARY, BYTES: _BINARY, PNG: _BINARY}},
+        **problems(406, 408, 413, 422, 500, 503),
+    },
+)
+async def map_of_stability(request: Request, body: TheBody) -> Response:
+    """Where in the plane of speed and K_e is the blade stable?
+
+    By `Accept`: JSON, the arrays as npz (numpy; no pickle), or a chart as PNG.
+    """
+    desk = the_desk(request)
+    form = best_form(request.headers.get("accept"), MAP_FORMS)
+
+    def answer() -> bytes:
+        ask = MapQuestion.read(parsed(body), desk.settings)
+        if form == PNG:
+            ask.check_chartable()
+        answerer = desk.answerer(ask.policy)
+        found = answerer.map(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy)
+        if form == JSON:
+            return replies.to_json(replies.map_to_dict(found))
+        if form == PNG:
+            return _chart(answerer, ask, found)
+        return replies.map_to_npz(found)
+
+    return Response(await desk.work.run(answer), media_type=form, headers={"Vary": "Accept"})
+
+
+def _chart(answerer: Answerer, ask: MapQuestion, found: MapAnswers) -> bytes:
+    # Here, not above: only charts need matplotlib, and it takes a second to load.
+    from service.charts import map_png
+
+    boundary = None
+    if ask.contact.permanent:  # with arcs a boundary costs more than the map
+        ke_max = float(ask.ke[-1])
+        boundary = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ke_max, ask.policy)
+    return map_png(ask.blade, ask.contact, found, boundary)

@@ -1,0 +1,101 @@
+"""What the service answers, as OpenAPI shows it; a test holds every answer against its model."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Source = Literal["surrogate", "exact"]
+Reason = Literal["confident", "near_boundary", "out_of_domain", "requested"]
+
+
+class Reply(BaseModel):
+    """What every answer says about where it comes from."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    model: str | None = Field(description="The surrogate; null where none is loaded.")
+    solver: str = Field(description="The exact method.")
+
+
+class PointsReply(Reply):
+    """Verdicts, one a point. An entry is null where its source does not compute it."""
+
+    stable: list[bool | None] = Field(description="null: not decided to tolerance.")
+    unstable_probability: list[float | None] = Field(description="The surrogate's.")
+    spectral_radius: list[float | None] = Field(description="The exact core's.")
+    growth_per_revolution: list[float | None] = Field(description="ln of the spectral radius.")
+    chatter_hz: list[float | None]
+    error_estimate: list[float | None]
+    source: list[Source]
+    reason: list[Reason]
+
+
+class BoundaryReply(Reply):
+    """The first crossing at each speed."""
+
+    critical_ke: list[float | None] = Field(description="N/m; null where there is none below ke_max.")
+    chatter_hz: list[float | None]
+    error_estimate: list[float | None]
+    unstable_ke: list[list[tuple[float, float]] | None] = Field(
+        description="Intervals of instability below ke_max, N/m; null where the surrogate answered."
+    )
+    source: list[Source]
+    reason: list[Reason]
+
+
+class MapReply(Reply):
+    """Verdicts on a grid: rows go with `ke`, columns with `speed_hz`."""
+
+    speed_hz: list[float]
+    ke: list[float]
+    stable: list[list[bool | None]] = Field(description="null: not decided to tolerance.")
+    unstable_probability: list[list[float | None]]
+    source: list[list[Source]]
+    reason: list[list[Reason]]
+    exact_share: float = Field(description="Share of the points the exact core answered.")
+    unstable_share: float | None = Field(description="Share of the decided points that are unstable.")
+
+
+class ProblemDocument(BaseModel):
+    """RFC 9457 problem details, with the field, its value and the remedy."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    field: str = Field(description="Where, as the caller wrote it, e.g. `blade.states[0].frequency_hz[1]`.")
+    value: str = Field(description="What was found there.")
+    remedy: str = Field(description="What to do.")
+    request_id: str | None = Field(description="As in the X-Request-Id header.")
+
+
+class Alive(BaseModel):
+    """The process runs."""
+
+    status: Literal["alive"] = "alive"
+    version: str
+
+
+class Ready(BaseModel):
+    """The service answers."""
+
+    status: Literal["ready"] = "ready"
+    model: str | None
+    solver: str
+
+
+class Model(BaseModel):
+    """A surrogate of the registry."""
+
+    id: str
+    active: bool = Field(description="True for the one that answers.")
+    card: dict[str, Any] = Field(description="What it was trained on, where it holds, how often it errs.")
+
+
+class Models(BaseModel):
+    """The surrogates there are."""
+
+    models: list[Model]

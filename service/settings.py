@@ -1,0 +1,77 @@
+"""Every setting of the service, read once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from annotated_types import Gt
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+Count = Annotated[int, Gt(0)]
+Seconds = Annotated[float, Gt(0)]
+Ratio = Annotated[float, Gt(0)]
+
+
+class Settings(BaseSettings):
+    """Settings of the service; each is also an environment variable, e.g. ``RUBSCREEN_MAX_POINTS``.
+
+    Attributes
+    ----------
+    models_folder
+        Where the models are; None is the one that came with the package.
+    max_body_bytes
+        Largest request body; longer ones are refused while they arrive.
+    body_timeout_s
+        Time a client has to send a whole body.
+    max_points
+        Points of one stability request, and speeds times stiffnesses of one map.
+    max_boundary_speeds
+        Speeds of one boundary request.
+    max_modes, max_tip_nodes, max_states
+        Size of a blade.
+    max_arcs
+        Arcs of engagement of a contact.
+    max_vibrations_per_revolution
+        Highest natural frequency over rotor speed: the exact core's work grows with it.
+    max_frequency_span
+        Highest natural frequency over the lowest.
+    max_contact_ratio
+        Stiffness of the contact over the blade's own, K_e·max_j G_jj/ω_j²; rubbing blades stay below 1.
+    max_name_length
+        Characters in the name of a blade or of a tip node.
+    worker_threads
+        Requests computed at the same time; the others wait.
+    max_waiting
+        Requests that may wait; one more is told to come back (503).
+    shutdown_s
+        Time the requests being answered have to finish when the service is asked to stop.
+    log_level
+        Of the loggers under ``rubscreen``, access log included.
+
+    Examples
+    --------
+    >>> Settings(max_points=10_000).max_points
+    10000
+    """
+
+    model_config = SettingsConfigDict(env_prefix="RUBSCREEN_", frozen=True, extra="forbid")
+
+    models_folder: Path | None = None
+    max_body_bytes: Count = 16 * 2**20
+    body_timeout_s: Seconds = 60.0
+    max_points: Count = 250_000
+    max_boundary_speeds: Count = 10_000
+    max_modes: Count = 64
+    max_tip_nodes: Count = 256
+    max_states: Count = 64
+    max_arcs: Count = 64
+    max_vibrations_per_revolution: Ratio = 1000.0
+    max_frequency_span: Ratio = 1e4
+    max_contact_ratio: Ratio = 10.0
+    max_name_length: Count = 200
+    worker_threads: Count = os.cpu_count() or 1
+    max_waiting: Count = 64
+    shutdown_s: Count = 30
+    log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"

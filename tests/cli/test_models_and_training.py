@@ -1,0 +1,91 @@
+"""`rubscreen train` and `rubscreen models`, and models that are not whole."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from training import pipeline, registry
+from training.calibration import CalibrationFailed
+
+ROTOR = "nasa_rotor_37"
+
+
+@pytest.fixture
+def own_models(tmp_path):
+    """A copy of the shipped models."""
+    return shutil.copytree(registry.SHIPPED, tmp_path / "models")
+
+
+def test_the_active_model_is_marked(rubscreen, own_models):
+    result = rubscreen("models", "--models", str(own_models), "--json", "-")
+    assert result.exit_code == 0, result.output
+    listed = json.loads(result.stdout)["models"]
+    assert [entry["id"] for entry in listed if entry["active"]] == [registry.active_id()]
+    assert registry.active_id() in result.stderr
+
+
+def test_a_folder_without_models_says_what_to_do(rubscreen, tmp_path):
+    result = rubscreen("models", "--models", str(tmp_path))
+    assert result.exit_code == 0
+    assert "rubscreen train" in result.stdout
+    refused = rubscreen("map", ROTOR, "--models", str(tmp_path))
+    assert refused.exit_code == 2
+    assert str(tmp_path) in refused.stderr
+    assert "train a model first" in refused.stderr
+
+
+@pytest.mark.parametrize("name", ["model.safetensors", "card.json"])
+def test_a_model_file_cut_in_half_is_refused(rubscreen, own_models, name):
+    file = own_models / registry.active_id() / name
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    result = rubscreen("map", ROTOR, "--models", str(own_models))
+    assert result.exit_code == 2
+    assert result.stderr.startswith("rubscreen: model = ")
+    assert name in result.stderr
+    assert "rubscreen train" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_the_exact_core_answers_without_any_model(rubscreen, tmp_path):
+    options = ["--policy", "exact", "--grid", "5x5", "--models", str(tmp_path)]
+    result = rubscreen("map", ROTOR, *options)
+    assert result.exit_code == 0, result.output
+    assert "100.0% answered by the exact core" in result.stdout
+
+
+def test_training_that_fails_its_calibration_ends_with_exit_code_1(rubscreen, tmp_path, monkeypatch):
+    def fail(*arguments, **settings):
+        raise CalibrationFailed("false-stable rate above 0.0005")
+
+    monkeypatch.setattr(pipeline, "train", fail)
+    result = rubscreen("train", str(tmp_path / "models"))
+    assert result.exit_code == 1
+    assert "no model was written" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_training_options_reach_the_pipeline(rubscreen, tmp_path, monkeypatch):
+    seen = {}
+
+    def stop(folder, settings, **more):
+        seen.update(folder=folder, settings=settings, **more)
+        raise CalibrationFailed("enough")
+
+    monkeypatch.setattr(pipeline, "train", stop)
+    rubscreen("train", str(tmp_path), "--seed", "7", "--designs", "128", "--epochs", "3", "--no-activate")
+    assert (seen["settings"].seed, seen["settings"].designs, seen["settings"].fit.epochs) == (7, 128, 3)
+    assert seen["folder"] == tmp_path
+    assert seen["activate"] is False
+
+
+def test_training_into_a_file_is_refused_before_any_work(rubscreen, tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "train", None)
+    blocker = tmp_path / "file.txt"
+    blocker.write_text("in the way")
+    result = rubscreen("train", str(blocker / "models"))
+    assert result.exit_code == 2
+    assert "can be written" in result.stderr

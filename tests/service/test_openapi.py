@@ -1,0 +1,77 @@
+"""The documentation: committed, whole, usable, and without the internet."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.app import create_app
+
+COMMITTED = Path(__file__).parents[2] / "docs" / "openapi.json"
+
+
+@pytest.fixture(scope="module")
+def document() -> dict[str, Any]:
+    return create_app().openapi()
+
+
+def test_the_committed_document_is_the_services_own(document):
+    committed = json.loads(COMMITTED.read_text(encoding="utf-8"))
+    assert committed == json.loads(json.dumps(document)), (
+        "the wire contract changed: raise the version, then python -m service.openapi > docs/openapi.json"
+    )
+
+
+def test_every_reference_leads_somewhere(document):
+    for reference in re.findall(r'"\$ref": "#/([^"]+)"', json.dumps(document)):
+        target = document
+        for part in reference.split("/"):
+            target = target[part]
+
+
+def test_every_path_of_the_contract_is_there(document):
+    paths = {f"{method.upper()} {path}" for path, item in document["paths"].items() for method in item}
+    assert paths == {
+        "POST /v1/stability",
+        "POST /v1/boundary",
+        "POST /v1/map",
+        "GET /v1/models",
+        "GET /healthz",
+        "GET /readyz",
+    }
+
+
+def test_every_refusal_is_documented_as_a_problem(document):
+    for path in ("/v1/stability", "/v1/boundary", "/v1/map"):
+        responses = document["paths"][path]["post"]["responses"]
+        for status in ("408", "413", "422", "500", "503"):
+            assert list(responses[status]["content"]) == ["application/problem+json"]
+    forms = document["paths"]["/v1/map"]["post"]["responses"]["200"]["content"]
+    assert set(forms) == {"application/json", "application/x-npz", "application/octet-stream", "image/png"}
+
+
+def test_the_examples_work_as_they_stand(document, http):
+    for path in ("/v1/stability", "/v1/boundary", "/v1/map"):
+        body = document["paths"][path]["post"]["requestBody"]["content"]["application/json"]
+        assert http.post(path, json=body["example"]).status_code == 200
+        required = document["components"]["schemas"][body["schema"]["$ref"].rpartition("/")[2]]["required"]
+        assert set(required) <= body["example"].keys()
+
+
+def test_the_documentation_page_loads_nothing_from_elsewhere(http):
+    page = http.get("/docs")
+    assert page.headers["content-type"].startswith("text/html")
+    loaded = re.findall(r'(?:src|href)="([^"]+)"', page.text)
+    assert loaded and all(link.startswith("/") and not link.startswith("//") for link in loaded)
+    for link in loaded:
+        assert http.get(link).status_code == 200
+    assert '"validatorUrl": null' in page.text
+    assert http.get("/openapi.json").json()["info"]["title"] == "rubscreen"
+
+
+def test_an_asset_that_is_not_there_is_a_problem(http, problem):
+    problem(http.get("/docs/assets/none.js"), 404, "path")
