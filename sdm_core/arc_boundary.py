@@ -44,7 +44,7 @@ def arc_crossings(
     """
     low = least_destabilising_ke(problem)
     if low >= ke_max:
-        return Crossings(*(np.zeros(0) for _ in range(4)))
+        return Crossings(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
     low = max(low, 1e-9 * ke_max)
     grid = np.geomspace(low, ke_max, 2 + int(np.log(ke_max / low) / np.log(SCAN_RATIO)))
     unstable = []
@@ -56,8 +56,8 @@ def arc_crossings(
     for i in range(len(unstable) - 1):
         if unstable[i] != unstable[i + 1]:
             found.append(_between(problem, grid[i], grid[i + 1], unstable[i + 1]))
-    columns = np.array(found).reshape(-1, 4).T
-    return Crossings(*columns)
+    ke, frequency, direction, error = np.array(found).reshape(-1, 4).T
+    return Crossings(ke, frequency, direction, error)
 
 
 def _unstable(problem: RubbingBlade, ke: float) -> bool:

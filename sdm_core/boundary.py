@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class BoundarySolution:
     chatter_hz
         Chatter frequency there, Hz.
     error_estimate
-        Relative error of `critical_ke`; infinite where the proof did not succeed.
+        Relative error of `critical_ke`; infinite where the proof did not succeed, also of there
+        being no crossing.
     unstable_ke
         Intervals of instability up to `ke_max`, (low, high) in N/m, for each speed.
     method
@@ -103,7 +104,7 @@ def boundary(
         float(ke_max),
         np.array([c.ke[0] if len(c.ke) else np.nan for c in found]),
         np.array([c.frequency_hz[0] if len(c.ke) else np.nan for c in found]),
-        np.array([c.error_estimate[0] if len(c.ke) else 0.0 for c in found]),
+        np.array([_first_error(c) for c in found]),
         tuple(c.unstable_intervals(ke_max) for c in found),
         CLOSED_FORM if contact.permanent else CHARACTERISTIC,
     )
@@ -179,8 +180,13 @@ def _crossings(
     found = crossings(receptance, problem.speed_hz, ke_max, sweep=finer)
     if _proven(receptance, problem.speed_hz, found, ke_max):
         return found
-    error = np.full(len(found.ke), np.inf)
-    return Crossings(found.ke, found.frequency_hz, found.direction, error)
+    return replace(found, error_estimate=np.full(len(found.ke), np.inf), proven=False)
+
+
+def _first_error(found: Crossings) -> float:
+    if not found.proven:
+        return np.inf
+    return float(found.error_estimate[0]) if len(found.ke) else 0.0
 
 
 def _proven(receptance: ContactReceptance, speed_hz: float, found: Crossings, ke_max: float) -> bool:
@@ -201,6 +207,8 @@ def _from_crossings(problem: RubbingBlade, ke: np.ndarray, sweeps: _SharedSweeps
     if not (ke > 0).any():
         return _unloaded(problem, ke)
     found = _crossings(problem, float(ke.max()) * (1 + 1e-6), sweeps, lambda: False)
+    if not found.proven:
+        return np.full(len(ke), np.nan)
     pairs = np.array([found.direction[found.ke <= k].sum() for k in ke])
     out = np.where(pairs > 0, 0.0, 1.0)
     for crossing, error in zip(found.ke, found.error_estimate, strict=True):

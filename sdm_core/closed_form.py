@@ -27,12 +27,15 @@ class Crossings:
         +1 where a pair of roots becomes unstable as K_e rises, −1 where one becomes stable again.
     error_estimate
         Relative error of `ke`.
+    proven
+        False when another method contradicts these crossings, or could not confirm them.
     """
 
     ke: np.ndarray
     frequency_hz: np.ndarray
     direction: np.ndarray
     error_estimate: np.ndarray
+    proven: bool = True
 
     @property
     def consistent(self) -> bool:
@@ -84,7 +87,7 @@ def crossings(
     if receptance.rank == 0:
         return _none()
     w, z, spread = _candidates(sweep or swept(receptance, ke_max), tau)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         ke = np.where(z.real < 0, -(np.abs(z) ** 2) / (2 * z.real), np.inf)
     near = ke < 1.2 * ke_max
     if first_only and near.any():

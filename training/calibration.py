@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
+from sdm_core.errors import RubscreenError
 from training.surrogate import PredictedBoundary
 
 # Candidate bands in spreads, safest first: the order of the fixed sequence, set before any data.
@@ -56,7 +57,7 @@ class VerificationBand:
         return asdict(self)
 
 
-class CalibrationFailed(RuntimeError):
+class CalibrationFailed(RubscreenError):
     """No band keeps the bound: too few points, or too poor a surrogate."""
 
 

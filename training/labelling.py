@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sdm_core.closed_form import crossings
+from sdm_core.errors import RubscreenError
 from sdm_core.receptance import Sweep, swept
 from sdm_core.root_count import unstable_root_count
 from training.cases import CaseBatch
@@ -21,7 +22,7 @@ _AUDIT_EVERY = 16  # every so many labels, the root count must confirm the close
 Progress = Callable[[int, int], None]
 
 
-class LabelAuditFailed(RuntimeError):
+class LabelAuditFailed(RubscreenError):
     """Two exact methods disagree: a defect of the core, never to be trained on."""
 
 

@@ -107,3 +107,14 @@ def test_chatter_frequency_in_permanent_contact_is_that_of_the_crossing_root():
         at = stability(problem.with_ke(found.ke[0]))
         assert at.spectral_radius == pytest.approx(1.0, abs=1e-9)
         assert at.chatter_hz == pytest.approx(found.frequency_hz[0], rel=1e-7)
+
+
+def test_what_the_root_count_does_not_confirm_is_not_decided(monkeypatch):
+    blade, contact = benchmark_blade(), ContactConfiguration.at("tip")
+    speed = np.array([0.23, 0.3])
+    monkeypatch.setattr("sdm_core.boundary.unstable_root_count", lambda *_: np.full(3, np.nan))
+    found = boundary(blade, contact, speed, 4.0)
+    assert np.isinf(found.error_estimate).all()
+    assert np.isnan(verdicts(blade, contact, speed, np.array([1e-3, 2.0]))).all()
+    none_below = boundary(blade, contact, speed, 1e-6)
+    assert np.isnan(none_below.critical_ke).all() and np.isinf(none_below.error_estimate).all()
