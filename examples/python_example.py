@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from sdm_core.blade import example_blade
 from sdm_core.contact import ContactConfiguration
-from service.screen import screen
+from service.screening.screen import screen
 from service.speeds import SpeedRange
 from training.screening import Screener
 

@@ -10,10 +10,10 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from sdm_core.version import __version__
-from service import access_log, errors, openapi
 from service.answerer import Answerer
-from service.desk import Desk
-from service.routes import health, models, stability
+from service.rest import access_log, errors, openapi
+from service.rest.desk import Desk
+from service.rest.routes import health, models, stability
 from service.settings import Settings
 
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from

@@ -13,8 +13,8 @@ import orjson
 from sdm_core.blade import Blade, blade_to_dict
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile, RubscreenError
-from service import replies
-from service.errors import PROBLEM_JSON
+from service.rest import replies
+from service.rest.errors import PROBLEM_JSON
 from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
 
 Json = dict[str, Any]

@@ -24,8 +24,8 @@ from service.answerer import Answerer
 from service.client import Client
 from service.commands.outputs import progress_bar, terminal
 from service.commands.tables import ranking_table
-from service.report_files import write_report
-from service.screen import ScreeningReport, screen
+from service.screening.report_files import write_report
+from service.screening.screen import ScreeningReport, screen
 from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
 
 READY_WITHIN_S = 60.0

@@ -68,10 +68,10 @@ def run(
         write_json,
     )
     from service.commands.tables import critical_speeds_table
-    from service.lobe_tips import lobe_grid
-    from service.replies import boundary_to_dict
+    from service.rest.replies import boundary_to_dict
+    from service.screening.lobe_tips import lobe_grid
+    from service.screening.sweep import cut_off, searched
     from service.speeds import evenly_spaced
-    from service.sweep import cut_off, searched
 
     check_writable(json=json, png=png)
     chosen = blade_from(blade)
@@ -102,7 +102,7 @@ def run(
         tail = {"critical_speeds": [asdict(tip) for tip in tips]}
         write_json(json, {**head, **boundary_to_dict(answers), **tail})
     if png:
-        from service.charts import boundaries_png, described
+        from service.screening.charts import boundaries_png, described
 
         write_bytes(
             "--png", png, boundaries_png(chosen, {described(contact): wide}, ke_max=ke_max, ke_liner=ke_liner)

@@ -20,7 +20,7 @@ def run(
     from service.commands.inputs import check_stiffnesses, grid_from
     from service.commands.outputs import check_writable
     from service.demo import demonstrate
-    from service.screen import KE_MAX
+    from service.screening.screen import KE_MAX
 
     check_writable(out=f"{out}/report.json")
     check_stiffnesses(KE_MAX, ke_liner)

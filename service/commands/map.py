@@ -69,7 +69,7 @@ def run(
         write_bytes,
         write_json,
     )
-    from service.replies import map_to_dict, map_to_npz
+    from service.rest.replies import map_to_dict, map_to_npz
     from service.speeds import evenly_spaced
 
     check_writable(json=json, npz=npz, png=png)
@@ -98,8 +98,8 @@ def run(
         write_bytes("--npz", npz, map_to_npz(answers))
     if png:
         from sdm_core.validation import KE_LIMIT
-        from service.charts import map_png
-        from service.lobe_tips import SEARCH_MARGIN, lobe_grid
+        from service.screening.charts import map_png
+        from service.screening.lobe_tips import SEARCH_MARGIN, lobe_grid
 
         # With arcs an exact line takes minutes, and the map is exact anyway.
         line = None

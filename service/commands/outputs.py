@@ -14,7 +14,7 @@ from typing import Any
 from rich.console import Console
 
 from sdm_core.errors import InvalidInput
-from service.replies import to_json
+from service.rest.replies import to_json
 
 STDOUT = "-"
 

@@ -81,7 +81,7 @@ def run(
     from service.commands.inputs import answerer_from, blade_from, check_stiffnesses, contacts_from, grid_from
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
     from service.commands.tables import ranking_table
-    from service.screen import screen
+    from service.screening.screen import screen
     from service.speeds import SpeedRange
 
     report_path = None if out is None else f"{out}/report.json"
@@ -116,7 +116,7 @@ def run(
     if json:
         write_json(json, report.to_dict(), indent=True)
     if out:
-        from service.report_files import write_report
+        from service.screening.report_files import write_report
 
         for path in write_report(out, report):
             console.print(f"[dim]wrote {path}[/dim]")

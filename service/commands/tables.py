@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from service.screen import UNSTABLE
+from service.screening.screen import UNSTABLE
 
 if TYPE_CHECKING:
-    from service.lobe_tips import CriticalSpeed
-    from service.screen import ScreeningReport
+    from service.screening.lobe_tips import CriticalSpeed
+    from service.screening.screen import ScreeningReport
 
 
 def critical_speeds_table(title: str, tips: Sequence[CriticalSpeed]) -> Table:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from sdm_core.contact import ContactConfiguration
-from service.charts import boundaries_png, described, map_png, ranking_png
-from service.screen import screen
+from service.screening.charts import boundaries_png, described, map_png, ranking_png
+from service.screening.screen import screen
 
 SPEEDS = np.linspace(60.0, 210.0, 40)
 KE = np.linspace(0.0, 2.5e4, 30)

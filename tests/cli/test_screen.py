@@ -10,11 +10,11 @@ import pytest
 from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, InvalidInput, OutOfSpeedRange
-from service.lobe_tips import deepest_lobe_tips, lobe_grid
-from service.replies import to_json
-from service.screen import STABLE, UNDECIDED, UNSTABLE, default_contacts, screen
+from service.rest.replies import to_json
+from service.screening.lobe_tips import deepest_lobe_tips, lobe_grid
+from service.screening.screen import STABLE, UNDECIDED, UNSTABLE, default_contacts, screen
+from service.screening.sweep import cut_off, swept
 from service.speeds import SpeedRange
-from service.sweep import cut_off, swept
 
 LE = {"LE": ContactConfiguration.at("LE")}
 EVEN = np.linspace(60.0, 210.0, 20)

@@ -19,7 +19,7 @@ from fastapi import FastAPI
 
 from sdm_core.errors import InvalidInput
 from service.app import create_app
-from service.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
+from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
 from service.settings import Settings
 from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
 

@@ -13,9 +13,9 @@ import pytest
 from sdm_core.blade import example_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile
-from service import replies
 from service.answerer import Answerer
 from service.client import Client, ServiceProblem
+from service.rest import replies
 
 BLADE = example_blade("nasa_rotor_37")
 CONTACT = ContactConfiguration.at("LE", "TE", arcs=[(0.0, 0.25), (0.9, 0.95)])

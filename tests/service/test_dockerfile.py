@@ -31,7 +31,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.question_schemas import POINTS_EXAMPLE
+from service.rest.question_schemas import POINTS_EXAMPLE
 
 REPOSITORY = Path(__file__).parents[2]
 DOCKERFILE = REPOSITORY / "Dockerfile"

@@ -10,8 +10,8 @@ import pytest
 
 from sdm_core.errors import DamagedFile
 from sdm_core.version import __version__
-from service import desk
 from service.app import create_app
+from service.rest import desk
 
 
 def test_a_service_with_a_model_is_alive_and_ready(http):

@@ -22,7 +22,8 @@ def document() -> dict[str, Any]:
 def test_the_committed_document_is_the_services_own(document):
     committed = json.loads(COMMITTED.read_text(encoding="utf-8"))
     assert committed == json.loads(json.dumps(document)), (
-        "the wire contract changed: raise the version, then python -m service.openapi > docs/openapi.json"
+        "the wire contract changed: raise the version, then run "
+        "python -m service.rest.openapi > docs/openapi.json"
     )
 
 

@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sdm_core.errors import InvalidInput
-from service.body import parsed
-from service.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
-from service.questions import BoundaryQuestion, MapQuestion, PointsQuestion, Question
+from service.rest.body import parsed
+from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
+from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, Question
 from service.settings import Settings
 
 QUESTIONS: dict[type[Question], dict[str, Any]] = {

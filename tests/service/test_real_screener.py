@@ -18,7 +18,7 @@ from sdm_core.boundary import boundary
 from sdm_core.contact import ContactConfiguration
 from service.app import create_app
 from service.client import Client
-from service.question_schemas import POINTS_EXAMPLE
+from service.rest.question_schemas import POINTS_EXAMPLE
 from service.settings import Settings
 from training.calibration import VerificationBand
 from training.design_space import DesignSpace

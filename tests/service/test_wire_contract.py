@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from service.schemas import BoundaryReply, MapReply, PointsReply
+from service.rest.schemas import BoundaryReply, MapReply, PointsReply
 
 REPLIES = {"/v1/stability": PointsReply, "/v1/boundary": BoundaryReply, "/v1/map": MapReply}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter
 from starlette.requests import Request
 
-from service.openapi import problems
-from service.routes.request import the_desk
-from service.schemas import Model, Models
+from service.rest.openapi import problems
+from service.rest.routes.request import the_desk
+from service.rest.schemas import Model, Models
 
 router = APIRouter(prefix="/v1", tags=["models"])
 

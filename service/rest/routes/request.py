@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import Request
 
-from service.body import whole_body
-from service.desk import Desk
+from service.rest.body import whole_body
+from service.rest.desk import Desk
 
 
 def the_desk(request: Request) -> Desk:

@@ -21,8 +21,8 @@ from sdm_core.blade import SCHEMA, Blade, blade_from_dict
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
-from service.limits import TooLarge, check_blade_size, check_length, check_reach
-from service.question_schemas import BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
+from service.rest.limits import TooLarge, check_blade_size, check_length, check_reach
+from service.rest.question_schemas import BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
 from training.answers import POLICIES
 

@@ -11,7 +11,7 @@ from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.validation import KE_LIMIT
 from service.answerer import Answerer
-from service.lobe_tips import SEARCH_MARGIN, CriticalSpeed, deepest_lobe_tips
+from service.screening.lobe_tips import SEARCH_MARGIN, CriticalSpeed, deepest_lobe_tips
 from training.answers import EXACT, BoundaryAnswers
 
 Progress = Callable[[int, int, str], None]

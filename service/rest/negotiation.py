@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from service.errors import NotAcceptable
+from service.rest.errors import NotAcceptable
 
 
 def best_form(accept: str | None, offered: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The OpenAPI document; ``python -m service.openapi`` prints the one committed as ``docs/openapi.json``."""
+"""The OpenAPI document; ``python -m service.rest.openapi`` prints what ``docs/openapi.json`` holds."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from service.errors import PROBLEM_JSON
-from service.question_schemas import BLADE, CONTACT
-from service.questions import BoundaryQuestion, MapQuestion, PointsQuestion
-from service.schemas import ProblemDocument
+from service.rest.errors import PROBLEM_JSON
+from service.rest.question_schemas import BLADE, CONTACT
+from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.rest.schemas import ProblemDocument
 
 Json = dict[str, Any]
 

@@ -1,6 +1,6 @@
 """The parts of a question as OpenAPI shows them, with an example.
 
-The core parses them (`service.questions`), so here they are only described; a test posts each example.
+The core parses them (`service.rest.questions`), so here they are only described; a test posts each example.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ from fastapi import APIRouter
 from starlette.requests import Request
 
 from sdm_core.version import __version__
-from service.openapi import problems
-from service.routes.request import the_desk
-from service.schemas import Alive, Ready
+from service.rest.openapi import problems
+from service.rest.routes.request import the_desk
+from service.rest.schemas import Alive, Ready
 
 router = APIRouter(tags=["health"])
 

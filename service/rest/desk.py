@@ -13,8 +13,8 @@ from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
-from service.errors import NotReady
-from service.limits import WorkQueue
+from service.rest.errors import NotReady
+from service.rest.limits import WorkQueue
 from service.settings import Settings
 from training.answers import PointAnswers
 from training.registry import SHIPPED, ModelEntry, list_models

@@ -13,9 +13,9 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number
 from service.answerer import Answerer
-from service.lobe_tips import CriticalSpeed, lobe_grid
+from service.screening.lobe_tips import CriticalSpeed, lobe_grid
+from service.screening.sweep import Progress, searched
 from service.speeds import SpeedRange, evenly_spaced, operating_range
-from service.sweep import Progress, searched
 from training.answers import EXACT, BoundaryAnswers, MapAnswers
 
 # [SBL] section 4: K_e up to 2.5e4 N/m covers the cutting forces seen in experiments.

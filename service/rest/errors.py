@@ -15,7 +15,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
 from sdm_core.errors import DamagedFile, InvalidInput, ModesNotTracked, OutOfSpeedRange, TooMuchWork
-from service.limits import Busy, SlowBody, TooLarge
+from service.rest.limits import Busy, SlowBody, TooLarge
 
 PROBLEM_JSON = "application/problem+json"
 logger = logging.getLogger("rubscreen.service")

@@ -9,7 +9,7 @@ import anyio
 from starlette.requests import Request
 
 from sdm_core.errors import InvalidInput
-from service.limits import SlowBody, TooLarge
+from service.rest.limits import SlowBody, TooLarge
 from service.settings import Settings
 
 # A blade is six containers deep; deeper than this no question is.

@@ -23,8 +23,8 @@ from training.answers import EXACT, BoundaryAnswers, MapAnswers
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from service.lobe_tips import CriticalSpeed
-    from service.screen import ScreeningReport
+    from service.screening.lobe_tips import CriticalSpeed
+    from service.screening.screen import ScreeningReport
 
 DPI = 300
 _SIZE = (7.2, 4.9)

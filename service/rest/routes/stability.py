@@ -6,15 +6,15 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service import replies
 from service.answerer import Answerer
-from service.body import parsed
-from service.negotiation import best_form
-from service.openapi import problems, request_body
-from service.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
-from service.questions import BoundaryQuestion, MapQuestion, PointsQuestion
-from service.routes.request import TheBody, the_desk
-from service.schemas import BoundaryReply, MapReply, PointsReply
+from service.rest import replies
+from service.rest.body import parsed
+from service.rest.negotiation import best_form
+from service.rest.openapi import problems, request_body
+from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
+from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.rest.routes.request import TheBody, the_desk
+from service.rest.schemas import BoundaryReply, MapReply, PointsReply
 from training.answers import MapAnswers
 
 JSON, NPZ, BYTES, PNG = "application/json", "application/x-npz", "application/octet-stream", "image/png"
@@ -96,7 +96,7 @@ async def map_of_stability(request: Request, body: TheBody) -> Response:
 
 def _chart(answerer: Answerer, ask: MapQuestion, found: MapAnswers) -> bytes:
     # Here, not above: only charts need matplotlib, and it takes a second to load.
-    from service.charts import map_png
+    from service.screening.charts import map_png
 
     boundary = None
     if ask.contact.permanent:  # with arcs a boundary costs more than the map

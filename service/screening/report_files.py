@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from service.charts import boundaries_png, map_png, ranking_png
 from service.commands.outputs import write_bytes, write_json
-from service.screen import ScreeningReport
+from service.screening.charts import boundaries_png, map_png, ranking_png
+from service.screening.screen import ScreeningReport
 
 
 def write_report(folder: str | Path, report: ScreeningReport) -> list[Path]:

@@ -1,0 +1,1 @@
+"""HTTP around the screening: bodies read, limits kept, answers and errors written."""

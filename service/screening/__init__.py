@@ -1,0 +1,1 @@
+"""Blades and contacts screened over their operating range: lobes found, ranked, drawn."""
