@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from sdm_core.characteristic import CharacteristicEquation
@@ -34,9 +32,7 @@ def least_destabilising_ke(problem: RubbingBlade) -> float:
     return float(1.0 / (2.2 * gain.max())) if np.isfinite(gain.max()) else 0.0
 
 
-def arc_crossings(
-    problem: RubbingBlade, ke_max: float, *, cancelled: Callable[[], bool] = lambda: False
-) -> Crossings:
+def arc_crossings(problem: RubbingBlade, ke_max: float) -> Crossings:
     """K_e up to `ke_max` at which the blade becomes unstable or stable again, at one speed.
 
     The verdict is proven by the argument principle at stiffnesses `SCAN_RATIO` apart from the
@@ -47,11 +43,7 @@ def arc_crossings(
         return Crossings(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
     low = max(low, 1e-9 * ke_max)
     grid = np.geomspace(low, ke_max, 2 + int(np.log(ke_max / low) / np.log(SCAN_RATIO)))
-    unstable = []
-    for ke in grid:
-        if cancelled():
-            break
-        unstable.append(_unstable(problem, ke))
+    unstable = [_unstable(problem, ke) for ke in grid]
     found = []
     for i in range(len(unstable) - 1):
         if unstable[i] != unstable[i + 1]:

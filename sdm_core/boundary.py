@@ -11,7 +11,7 @@ from sdm_core.arc_boundary import arc_crossings
 from sdm_core.blade import Blade
 from sdm_core.closed_form import Crossings, crossings
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import Cancelled
+from sdm_core.interruption import checkpoint
 from sdm_core.receptance import ContactReceptance, Sweep, swept
 from sdm_core.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
@@ -63,7 +63,6 @@ def boundary(
     *,
     extrapolate: bool = False,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] = lambda: False,
 ) -> BoundarySolution:
     """Exact stability boundary at each rotor speed.
 
@@ -76,8 +75,6 @@ def boundary(
         For unusable speeds, stiffness or contact.
     OutOfSpeedRange
         Where the blade's modal data do not reach.
-    Cancelled
-        When `cancelled()` turns true.
 
     Examples
     --------
@@ -94,9 +91,8 @@ def boundary(
     sweeps = _SharedSweeps(blade)
     found: list[Crossings] = []
     for i, problem in enumerate(problems):
-        if cancelled():
-            raise Cancelled("boundary")
-        found.append(_crossings(problem, ke_max, sweeps, cancelled))
+        checkpoint()
+        found.append(_crossings(problem, ke_max, sweeps))
         if progress is not None:
             progress(i + 1, len(problems))
     return BoundarySolution(
@@ -118,7 +114,6 @@ def verdicts(
     *,
     extrapolate: bool = False,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
     """Exact verdicts at points (speed, K_e): 1.0 stable, 0.0 unstable, NaN not decided; shape (m,).
 
@@ -133,14 +128,11 @@ def verdicts(
     groups = np.split(order, np.searchsorted(index[order], np.arange(1, len(unique))))
     done = 0
     for problem, members in zip(problems, groups, strict=True):
-        if cancelled():
-            raise Cancelled("verdicts")
+        checkpoint()
         if problem.permanent:
             out[members] = _from_crossings(problem, stiffness[members], sweeps)
         else:
             for i in members:
-                if cancelled():
-                    raise Cancelled("verdicts")
                 verdict = proven_verdict(problem.with_ke(stiffness[i]))
                 out[i] = np.nan if verdict is None else float(verdict)
         done += len(members)
@@ -165,11 +157,9 @@ class _SharedSweeps:
         return self._sweep
 
 
-def _crossings(
-    problem: RubbingBlade, ke_max: float, sweeps: _SharedSweeps, cancelled: Callable[[], bool]
-) -> Crossings:
+def _crossings(problem: RubbingBlade, ke_max: float, sweeps: _SharedSweeps) -> Crossings:
     if not problem.permanent:
-        return arc_crossings(problem, ke_max, cancelled=cancelled)
+        return arc_crossings(problem, ke_max)
     receptance = ContactReceptance(problem.omega, problem.damping_ratio, problem.contact_factor)
     if receptance.rank == 0:
         return crossings(receptance, problem.speed_hz, ke_max)
@@ -206,7 +196,7 @@ def _proven(receptance: ContactReceptance, speed_hz: float, found: Crossings, ke
 def _from_crossings(problem: RubbingBlade, ke: np.ndarray, sweeps: _SharedSweeps) -> np.ndarray:
     if not (ke > 0).any():
         return _unloaded(problem, ke)
-    found = _crossings(problem, float(ke.max()) * (1 + 1e-6), sweeps, lambda: False)
+    found = _crossings(problem, float(ke.max()) * (1 + 1e-6), sweeps)
     if not found.proven:
         return np.full(len(ke), np.nan)
     pairs = np.array([found.direction[found.ke <= k].sum() for k in ke])

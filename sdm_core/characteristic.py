@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm
 
+from sdm_core.interruption import checkpoint
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
@@ -83,6 +84,10 @@ class CharacteristicEquation:
     def fundamental(self, mu: np.ndarray) -> np.ndarray:
         """M(μ), shape (m, 2n, 2n)."""
         mu = np.atleast_1d(np.asarray(mu, dtype=complex))
+        if len(mu) > self._chunk:
+            starts = range(0, len(mu), self._chunk)
+            return np.concatenate([self.fundamental(mu[i : i + self._chunk]) for i in starts])
+        checkpoint()
         self.evaluations += len(mu)
         engaged = self._free + (1 / mu - 1)[:, None, None] * self._contact
         out = np.broadcast_to(np.eye(self.size), engaged.shape)
@@ -104,7 +109,17 @@ class CharacteristicEquation:
 
     def _permanent_rates(self, mu: np.ndarray) -> np.ndarray:
         self.evaluations += len(mu)
-        return np.linalg.eigvals(self._free + (1 / mu - 1)[:, None, None] * self._contact)
+        gain = (1 / mu - 1)[:, None, None]
+        pieces = []
+        for i in range(0, len(mu), self._chunk):
+            checkpoint()
+            pieces.append(np.linalg.eigvals(self._free + gain[i : i + self._chunk] * self._contact))
+        return np.concatenate(pieces)
+
+    @property
+    def _chunk(self) -> int:
+        """Matrices between two checkpoints: some tenths of a second of work."""
+        return max(1, int(4000 * (10 / self.size) ** 3))
 
     def _candidates(self, mu: np.ndarray) -> np.ndarray:
         """Eigenvalues of M(μ), shape (m, 2n); rows that overflow are zero."""

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from sdm_core.interruption import checkpoint
+
 
 @dataclass(frozen=True)
 class ContactReceptance:
@@ -48,7 +50,12 @@ class ContactReceptance:
         """λ(iω) in no order, shape (m, p)."""
         if self.rank == 1:
             return self.modal(1j * w) @ self.factor**2
-        return np.linalg.eigvals(self.matrix(1j * w))
+        chunk = max(1, int(20_000 * (5 / self.rank) ** 3))
+        pieces = []
+        for i in range(0, len(w), chunk):
+            checkpoint()
+            pieces.append(np.linalg.eigvals(self.matrix(1j * w[i : i + chunk])))
+        return np.concatenate(pieces)
 
     def eigenvalue_near(self, w: np.ndarray, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The eigenvalue whose inverse is nearest to `guess` (m,), and its derivative in s.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdm_core.errors import TooMuchWork
+from sdm_core.interruption import checkpoint
 from sdm_core.receptance import ContactReceptance
 
 MOST_FREQUENCIES = 1_000_000
@@ -37,6 +38,7 @@ def unstable_root_count(receptance: ContactReceptance, speed_hz: float, ke: np.n
     w = _frequencies(receptance, tau, ke.max())
     d = _characteristic(receptance, tau, w, ke)
     for _ in range(40):
+        checkpoint()
         step = np.abs(np.angle(d[1:] / d[:-1])).max(axis=1)
         wide = np.diff(w) > 1e-13 * w[1:]
         coarse = np.flatnonzero((step > _LARGEST_STEP) & wide)

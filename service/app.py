@@ -42,7 +42,11 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[State]:
         access_log.configure(settings.log_level)
-        yield {"desk": Desk.opened(settings, screener)}
+        desk = Desk.opened(settings, screener)
+        try:
+            yield {"desk": desk}
+        finally:
+            desk.work.close()
 
     # Not plain FastAPI, whose /docs loads its scripts from the internet.
     app: FastAPI = FastAPIOffline(

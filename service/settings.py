@@ -45,6 +45,8 @@ class Settings(BaseSettings):
         Requests computed at the same time; the others wait.
     max_waiting
         Requests that may wait; one more is told to come back (503).
+    deadline_s
+        Time the computation of one answer may take.
     shutdown_s
         Time the requests being answered have to finish when the service is asked to stop.
     log_level
@@ -73,5 +75,6 @@ class Settings(BaseSettings):
     max_name_length: Count = 200
     worker_threads: Count = os.cpu_count() or 1
     max_waiting: Count = 64
+    deadline_s: Seconds = 300.0
     shutdown_s: Count = 30
     log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"

@@ -36,11 +36,12 @@ class Model:
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """A line of the model list."""
+    """A line of the model list; a damaged model has no card and says what is wrong with it."""
 
     id: str
     active: bool
     card: dict[str, Any]
+    damage: str | None = None
 
 
 def write_model(
@@ -67,7 +68,7 @@ def write_model(
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
     text = json.dumps(full, indent=1, sort_keys=True) + "\n"
-    model_id = hashlib.sha256(weights + text.encode()).hexdigest()[:16]
+    model_id = _identifier(weights, text)
     target = folder / model_id
     if not target.exists():
         partial = folder / f".{model_id}.{os.getpid()}.partial"
@@ -98,7 +99,7 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
         raise InvalidInput(
             "model", chosen, f"name one of {', '.join(_ids(folder)) or 'none: train one first'}"
         )
-    card = _read_card(place)
+    card, text = _read_card(place)
     try:
         weights = (place / _WEIGHTS).read_bytes()
     except OSError as error:
@@ -109,6 +110,8 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
         raise DamagedFile(
             "model", str(place / _WEIGHTS), f"its checksum does not hold ({len(weights)} bytes); {_MEND}"
         )
+    if _identifier(weights, text) != chosen:
+        raise DamagedFile("model", str(place / _CARD), f"the card is not the one written; {_MEND}")
     if card["features"] != list(feature_names()):
         raise DamagedFile(
             "model", str(place), f"it was trained on other features than this code has; {_MEND}"
@@ -138,7 +141,7 @@ def active_id(folder: Path = SHIPPED) -> str:
 
 
 def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
-    """Every whole model of a folder, the active one first."""
+    """Every model of a folder, the active one first."""
     try:
         active = active_id(folder)
     except InvalidInput:
@@ -146,10 +149,14 @@ def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
     entries = []
     for name in _ids(folder):
         try:
-            entries.append(ModelEntry(name, name == active, _read_card(folder / name)))
-        except DamagedFile:
-            continue
+            entries.append(ModelEntry(name, name == active, load_model(name, folder).card))
+        except DamagedFile as error:
+            entries.append(ModelEntry(name, name == active, {}, f"{error.value}: {error.remedy}"))
     return sorted(entries, key=lambda e: (not e.active, e.id))
+
+
+def _identifier(weights: bytes, card: str) -> str:
+    return hashlib.sha256(weights + card.encode()).hexdigest()[:16]
 
 
 def _ids(folder: Path) -> list[str]:
@@ -158,9 +165,10 @@ def _ids(folder: Path) -> list[str]:
     return sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "_")))
 
 
-def _read_card(place: Path) -> dict[str, Any]:
+def _read_card(place: Path) -> tuple[dict[str, Any], str]:
     try:
-        card = json.loads((place / _CARD).read_text(encoding="utf-8"))
+        text = (place / _CARD).read_text(encoding="utf-8")
+        card = json.loads(text)
     except (OSError, ValueError) as error:
         raise DamagedFile("model", str(place / _CARD), f"cannot be read ({error}); {_MEND}") from None
     if not isinstance(card, dict) or card.get("format") != FORMAT:
@@ -169,4 +177,4 @@ def _read_card(place: Path) -> dict[str, Any]:
     for key in needed:
         if key not in card:
             raise DamagedFile("model", str(place / _CARD), f"{key} is missing; {_MEND}")
-    return card
+    return card, text

@@ -106,7 +106,7 @@ def read_blade(path: str | Path) -> Blade:
     try:
         return blade_from_dict(data)
     except InvalidInput as error:
-        raise error.under(path.name + ":") from None
+        raise type(error)(f"{path.name}: {error.field}", error.value, error.remedy) from None
 
 
 def write_blade(blade: Blade, path: str | Path) -> None:

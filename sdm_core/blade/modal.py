@@ -212,7 +212,7 @@ class Blade:
                 f"speed_hz[{int(np.argmax(outside))}]",
                 float(speed[outside][0]),
                 f"blade {self.name!r} has modal data from {low:g} to {high:g} Hz: "
-                "stay inside, add a state, or ask for extrapolation",
+                "stay inside, or add a state (in Python, extrapolate=True)",
             )
         squares, shapes = self._interpolant
         omega2 = squares(speed**2)
@@ -276,11 +276,11 @@ def _node_names(names: Any) -> tuple[str, ...]:
 
 
 def _damping(values: Any, modes: int) -> np.ndarray:
-    below_one = np.nextafter(1.0, 0.0)
+    below_one = 0.999_999
     if isinstance(values, int | float | np.number):
-        damping = np.full(modes, number("damping_ratio", values, 0.0, below_one, "(below 1)"))
+        damping = np.full(modes, number("damping_ratio", values, 0.0, below_one, ""))
     else:
-        damping = vector("damping_ratio", values, 0.0, below_one, "(below 1)")
+        damping = vector("damping_ratio", values, 0.0, below_one, "")
         if len(damping) != modes:
             raise InvalidInput(
                 "damping_ratio", f"{len(damping)} numbers", f"give one number, or one a mode: {modes}"

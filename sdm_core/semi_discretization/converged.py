@@ -39,8 +39,9 @@ class Converged:
     """Doubles the steps until Richardson's extrapolations agree to the tolerance.
 
     With an error c·N⁻² the extrapolation (4μ_{2N} − μ_N)/3 removes the leading term; the estimate
-    is the change from the last extrapolation to this one. The leading few multipliers are
-    extrapolated side by side, because the largest at a coarse step need not be the largest.
+    is the change from the last extrapolation to this one, or a quarter of the one before. The
+    leading few multipliers are extrapolated side by side, because the largest at a coarse step
+    need not be the largest.
 
     Parameters
     ----------
@@ -75,12 +76,17 @@ class Converged:
 
     def _extrapolated(self, spectra: list[np.ndarray], steps: int) -> ConvergedMultiplier:
         fine = spectra[-1]
-        if len(spectra) < 3:
+        if len(spectra) < 4:
             return ConvergedMultiplier(complex(fine[0]), np.inf, steps, False)
         middle = _nearest(fine, spectra[-2])
         coarse = _nearest(middle, spectra[-3])
-        better = fine + (fine - middle) / (2**ORDER - 1)
-        change = np.abs(better - (middle + (middle - coarse) / (2**ORDER - 1)))
+        coarsest = _nearest(coarse, spectra[-4])
+        better = _richardson(fine, middle)
+        change = np.abs(better - _richardson(middle, coarse))
+        # Where arcs end between two steps the error does not fall smoothly, and one small change may
+        # be chance: the change before it counts too, at the rate of the scheme.
+        before = np.abs(_richardson(middle, coarse) - _richardson(coarse, coarsest))
+        change = np.maximum(change, before / 2**ORDER)
         slow = np.abs(middle - coarse) < 2 * np.abs(fine - middle)  # not yet falling as N⁻²
         change = np.where(slow, np.maximum(change, np.abs(fine - middle)), change)
         best = int(np.argmax(np.abs(better)))
@@ -88,6 +94,10 @@ class Converged:
         rival = np.max(np.abs(better) + np.where(slow, change, 0.0)) - np.abs(better[best])
         estimate = float(max(change[best], rival) / max(np.abs(better[best]), 1e-300))
         return ConvergedMultiplier(complex(better[best]), estimate, steps, estimate <= self.tolerance)
+
+
+def _richardson(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    return fine + (fine - coarse) / (2**ORDER - 1)
 
 
 def _leading(mu: np.ndarray, most: int = 10) -> np.ndarray:

@@ -56,6 +56,7 @@ def run(
         answerer_from,
         blade_from,
         check_stiffnesses,
+        check_work,
         contact_from,
         speed_count,
         speeds_from,
@@ -70,15 +71,16 @@ def run(
     from service.commands.tables import critical_speeds_table
     from service.rest.replies import boundary_to_dict
     from service.screening.lobe_tips import lobe_grid
-    from service.screening.sweep import cut_off, searched
+    from service.screening.sweep import cut_off, searched, through_tips
     from service.speeds import evenly_spaced
 
-    check_writable(json=json, png=png)
+    check_writable(inputs=[blade], json=json, png=png)
     chosen = blade_from(blade)
     contact = contact_from(nodes, weights, arcs, chosen)
     low, high = speeds_from(speed, chosen)
     check_stiffnesses(ke_max, ke_liner)
     even = evenly_spaced(low, high, 200 if count is None else speed_count(count))
+    check_work(chosen, contact, (low, high), ke_max, here=url is None, every_lobe=count is None)
     grid = lobe_grid(chosen, contact, even, ke_max) if count is None else even
     answerer = answerer_from(url, models, policy.value)
 
@@ -104,6 +106,6 @@ def run(
     if png:
         from service.screening.charts import boundaries_png, described
 
-        write_bytes(
-            "--png", png, boundaries_png(chosen, {described(contact): wide}, ke_max=ke_max, ke_liner=ke_liner)
-        )
+        line = through_tips(answerer, chosen, contact, wide, tips)
+        chart = boundaries_png(chosen, {described(contact): line}, ke_max=ke_max, ke_liner=ke_liner)
+        write_bytes("--png", png, chart)

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sdm_core.blade import EXAMPLES, Blade, example_blade, read_blade
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import InvalidInput
+from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.validation import KE_LIMIT, number
-from service.speeds import SpeedRange, operating_range
+from service.speeds import SpeedRange, evenly_spaced, operating_range
 
 if TYPE_CHECKING:
     from service.answerer import Answerer
@@ -62,6 +64,45 @@ def contacts_from(
 def speeds_from(text: str | None, blade: Blade) -> tuple[float, float]:
     """(low, high) in Hz."""
     return operating_range(blade) if text is None else SpeedRange.parse(text, "--speed").for_blade(blade)
+
+
+def check_work(
+    blade: Blade,
+    contact: ContactConfiguration,
+    speeds_hz: tuple[float, float],
+    ke_max: float,
+    *,
+    here: bool,
+    every_lobe: bool,
+) -> None:
+    """Refuse what the exact core would take hours for, as the service does.
+
+    Parameters
+    ----------
+    here
+        Whether it is answered in this process; a service has limits of its own.
+    every_lobe
+        Whether every lobe is to be followed.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the option, its value and the remedy.
+    """
+    from service.commands.serve import settings_from
+    from service.rest.limits import check_reach
+    from service.screening.lobe_tips import lobe_grid
+
+    try:
+        if here:
+            check_reach(blade, contact, np.array(speeds_hz), "--ke-max", ke_max, settings_from(None))
+        if every_lobe:
+            lobe_grid(blade, contact, evenly_spaced(*speeds_hz, 2), ke_max)
+    except InvalidInput as error:
+        if not error.field.startswith("speed"):
+            raise
+        kind = OutOfSpeedRange if isinstance(error, OutOfSpeedRange) else InvalidInput
+        raise kind("--speed", error.value, error.remedy) from None
 
 
 def grid_from(text: str, field: str = "--grid") -> tuple[int, int]:

@@ -59,6 +59,7 @@ def run(
         answerer_from,
         blade_from,
         check_stiffnesses,
+        check_work,
         contact_from,
         grid_from,
         speeds_from,
@@ -72,12 +73,14 @@ def run(
     from service.rest.replies import map_to_dict, map_to_npz
     from service.speeds import evenly_spaced
 
-    check_writable(json=json, npz=npz, png=png)
+    check_writable(inputs=[blade], json=json, npz=npz, png=png)
     chosen = blade_from(blade)
     contact = contact_from(nodes, weights, arcs, chosen)
     low, high = speeds_from(speed, chosen)
     shape = grid_from(grid or ("200x200" if contact.permanent else "50x50"))
     check_stiffnesses(ke_max, ke_liner)
+    lined = png is not None and contact.permanent
+    check_work(chosen, contact, (low, high), ke_max, here=url is None, every_lobe=lined)
     answerer = answerer_from(url, models, policy.value)
 
     began = time.perf_counter()

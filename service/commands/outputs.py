@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,13 @@ def terminal(*, stderr: bool = False) -> Console:
     return made
 
 
-def check_writable(**paths: str | None) -> None:
-    """Refuse outputs that cannot be written, before any work is done.
+def check_writable(*, inputs: Sequence[str] = (), **paths: str | None) -> None:
+    """Refuse outputs that cannot be written, or that would cost a file still needed, before any work.
+
+    Parameters
+    ----------
+    inputs
+        Blades as typed; those that are files are not to be overwritten.
 
     Raises
     ------
@@ -46,17 +52,62 @@ def check_writable(**paths: str | None) -> None:
         if path == STDOUT:
             raise InvalidInput(f"--{option}", path, "give a file: only --json can go to stdout")
         with _named(f"--{option}", path):
-            if Path(path).is_dir():
-                raise IsADirectoryError(0, "it is a folder")
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            if not os.access(Path(path).parent, os.W_OK):
+            if _written_in_place(path):
+                place = Path(path)
+            else:
+                place = Path(path).resolve().parent
+                place.mkdir(parents=True, exist_ok=True)
+            if not os.access(place, os.W_OK):
                 raise PermissionError(0, "permission denied")
+    _check_distinct(inputs, {f"--{option}": path for option, path in paths.items() if path is not None})
+
+
+def _check_distinct(inputs: Sequence[str], outputs: dict[str, str]) -> None:
+    taken = {Path(text).resolve(): "the blade file read" for text in inputs if Path(text).exists()}
+    for option, path in outputs.items():
+        if path == STDOUT or _written_in_place(path):
+            continue
+        target = Path(path).resolve()
+        twin = next((name for name in taken if name == target or _same_file(name, target)), None)
+        if twin is not None:
+            raise InvalidInput(option, path, f"give another path: this one is also {taken[twin]}")
+        taken[target] = f"that of {option}"
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    """True of hard links too, and of names that differ by case where the file system sees none."""
+    return one.exists() and other.exists() and one.samefile(other)
+
+
+def _written_in_place(path: str | Path) -> bool:
+    """True of devices, pipes, and the open files under /dev and /proc: what a rename would replace.
+
+    Raises
+    ------
+    OSError
+        When it is a folder, or anything else that takes no file's content.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except FileNotFoundError:
+        return False
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(0, "it is a folder")
+    if stat.S_ISCHR(mode) or stat.S_ISFIFO(mode):
+        return True
+    if not stat.S_ISREG(mode):
+        raise OSError(0, "it is not a plain file")
+    return Path(path).is_absolute() and Path(path).parts[1] in ("dev", "proc")
 
 
 def write_bytes(option: str, path: str | Path, content: bytes) -> None:
-    """Write beside `path`, then rename onto it."""
-    target = Path(path)
+    """Write beside `path`, or beside what it links to, then rename; devices and pipes take it directly."""
     with _named(option, str(path)):
+        if _written_in_place(path):
+            with open(path, "wb") as device:
+                device.write(content)
+            return
+        target = Path(path).resolve()
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
         try:
@@ -85,7 +136,9 @@ def _named(option: str, path: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InvalidInput(option, path, f"give a path that can be written ({error.strerror})") from None
+        raise InvalidInput(
+            option, path, f"give a path that can be written ({error.strerror or error})"
+        ) from None
 
 
 def _umask() -> int:
@@ -103,7 +156,10 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[ShowProgress]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as bar:
+    console = Console(stderr=True)
+    # Where nobody watches, rich would leave an empty line behind.
+    disable = quiet or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=disable) as bar:
         task = bar.add_task(title, total=None)
 
         def show(done: int, total: int, text: str) -> None:

@@ -78,19 +78,30 @@ def run(
 
     Example: rubscreen screen nasa_rotor_37 generic_compressor_blade --ke-liner 9000
     """
-    from service.commands.inputs import answerer_from, blade_from, check_stiffnesses, contacts_from, grid_from
+    from service.commands.inputs import (
+        answerer_from,
+        blade_from,
+        check_stiffnesses,
+        check_work,
+        contacts_from,
+        grid_from,
+    )
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
     from service.commands.tables import ranking_table
-    from service.screening.screen import screen
-    from service.speeds import SpeedRange
+    from service.screening.screen import default_contacts, screen
+    from service.speeds import SpeedRange, operating_range
 
     report_path = None if out is None else f"{out}/report.json"
-    check_writable(json=json, out=report_path)
+    check_writable(inputs=blades, json=json, out=report_path)
     chosen = [blade_from(text) for text in blades]
     contacts = contacts_from(nodes or (), weights or (), arcs, chosen)
     speed_range = None if speed is None else SpeedRange.parse(speed, "--speed")
     shape = None if grid is None else grid_from(grid)
     check_stiffnesses(ke_max, ke_liner)
+    for each in chosen:
+        speeds = operating_range(each) if speed_range is None else speed_range.for_blade(each)
+        for contact in (contacts or default_contacts(each)).values():
+            check_work(each, contact, speeds, ke_max, here=url is None, every_lobe=True)
     answerer = answerer_from(url, models, policy.value)
 
     with progress_bar("screening") as progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,7 +30,7 @@ def run(
 
     from service.app import create_app
 
-    settings = _settings(models)
+    settings = settings_from(models)
     listening = _listening(host, port)
     app = create_app(settings)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
@@ -47,7 +48,14 @@ def run(
         uvicorn.Server(config).run(sockets=[listening])
 
 
-def _settings(models: str | None) -> Settings:
+def settings_from(models: str | None) -> Settings:
+    """The settings of the environment, and a models folder over theirs.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the environment variable that cannot be used.
+    """
     from pydantic import ValidationError
 
     from sdm_core.errors import InvalidInput
@@ -74,8 +82,8 @@ def _listening(host: str, port: int) -> socket.socket:
         listening.bind((host, port))
     except OSError as error:
         listening.close()
-        field, value = ("--host", host) if isinstance(error, socket.gaierror) else ("--port", str(port))
-        raise InvalidInput(
-            field, value, f"give a free port and an address of this machine ({error.strerror})"
-        ) from None
+        if error.errno in (errno.EADDRINUSE, errno.EACCES) and not isinstance(error, socket.gaierror):
+            raise InvalidInput("--port", port, f"give a free port ({error.strerror})") from None
+        remedy = f"give an address of this machine ({error.strerror or error})"
+        raise InvalidInput("--host", host, remedy) from None
     return listening

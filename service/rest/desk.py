@@ -60,7 +60,7 @@ class Desk:
             except InvalidInput as error:
                 logger.error("no surrogate: %s", error)
                 screener, fault = Screener(None), error
-        work = WorkQueue(settings.worker_threads, settings.max_waiting)
+        work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
         return cls(settings, screener, fault, work, CapacityLimiter(1))
 
     def models(self) -> list[ModelEntry]:

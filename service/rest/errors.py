@@ -14,7 +14,14 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from sdm_core.errors import DamagedFile, InvalidInput, ModesNotTracked, OutOfSpeedRange, TooMuchWork
+from sdm_core.errors import (
+    Cancelled,
+    DamagedFile,
+    InvalidInput,
+    ModesNotTracked,
+    OutOfSpeedRange,
+    TooMuchWork,
+)
 from service.rest.limits import Busy, SlowBody, TooLarge
 
 PROBLEM_JSON = "application/problem+json"
@@ -133,8 +140,14 @@ def _answer_gone(request: Request, error: Exception) -> Response:
     return Problem(kind, request.scope, "body", "cut off", "send the whole body")
 
 
+def _answer_stopped(request: Request, error: Exception) -> Response:
+    kind = Kind("stopped", "The work was stopped", 503, retry_after_s=5)
+    return Problem(kind, request.scope, "service", str(error), "send the request again later")
+
+
 def install(app: FastAPI) -> None:
     """Answer every exception of the table, and the framework's own, with a problem document."""
     app.add_exception_handler(InvalidInput, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     app.add_exception_handler(ClientDisconnect, _answer_gone)
+    app.add_exception_handler(Cancelled, _answer_stopped)

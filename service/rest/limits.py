@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
 from collections.abc import Callable, Sized
+from threading import Event
 from typing import Any, TypeVar
 
 import numpy as np
 from anyio import CapacityLimiter, to_thread
+from starlette.requests import Request
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import InvalidInput, OutOfSpeedRange
+from sdm_core.errors import Cancelled, InvalidInput, OutOfSpeedRange, TooMuchWork
+from sdm_core.interruption import interruptible
 from service.settings import Settings
 
 T = TypeVar("T")
@@ -123,17 +128,27 @@ def check_reach(
 class WorkQueue:
     """Runs work in threads, a few at a time, so that the event loop stays free.
 
+    Work stops at its next checkpoint when its time is up, its client has hung up, or the service closes.
+
     Parameters
     ----------
     threads
         Calls that run at the same time.
     max_waiting
         Calls that may wait for a thread.
+    deadline_s
+        Time one call may take, from when it gets a thread.
     """
 
-    def __init__(self, threads: int, max_waiting: int) -> None:
+    def __init__(self, threads: int, max_waiting: int, deadline_s: float) -> None:
         self._limiter = CapacityLimiter(threads)
         self._max_waiting = max_waiting
+        self._deadline_s = deadline_s
+        self._closing = Event()
+
+    def close(self) -> None:
+        """Stop what still runs."""
+        self._closing.set()
 
     def check_room(self) -> None:
         """Raise `Busy` when no further call may wait."""
@@ -141,7 +156,42 @@ class WorkQueue:
         if waiting >= self._max_waiting:
             raise Busy("service", f"{waiting} requests waiting", "send the request again later")
 
-    async def run(self, work: Callable[[], T]) -> T:
-        """The outcome of `work`, from a thread."""
+    async def run(self, work: Callable[[], T], request: Request) -> T:
+        """The outcome of `work`, from a thread.
+
+        Raises
+        ------
+        TooMuchWork
+            When the time is up.
+        Cancelled
+            When the client has gone or the service closes.
+        """
         self.check_room()
-        return await to_thread.run_sync(work, limiter=self._limiter)
+        gone = Event()
+
+        def stop_at(end: float) -> Callable[[], None]:
+            def check() -> None:
+                if gone.is_set() or self._closing.is_set():
+                    raise Cancelled("the client hung up, or the service is closing")
+                if time.monotonic() > end:
+                    found = f"more than {self._deadline_s:g} s of exact work"
+                    raise TooMuchWork("request", found, "ask for fewer points, speeds or modes in one call")
+
+            return check
+
+        def guarded() -> T:
+            with interruptible(stop_at(time.monotonic() + self._deadline_s)):
+                return work()
+
+        watch = asyncio.create_task(_hung_up(request, gone))
+        try:
+            return await to_thread.run_sync(guarded, limiter=self._limiter)
+        finally:
+            watch.cancel()
+
+
+async def _hung_up(request: Request, gone: Event) -> None:
+    """Set `gone` once the client has closed the connection."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+    gone.set()

@@ -93,6 +93,7 @@ class Model(BaseModel):
     id: str
     active: bool = Field(description="True for the one that answers.")
     card: dict[str, Any] = Field(description="What it was trained on, where it holds, how often it errs.")
+    damage: str | None = Field(None, description="What is wrong with its files; null when they are whole.")
 
 
 class Models(BaseModel):

@@ -88,14 +88,16 @@ def map_png(
     ]
     if (shade == 2).any():
         key.append(Patch(facecolor=_UNDECIDED, edgecolor="black", linewidth=0.8, label="not decided"))
-    key.append(_verified(axes, answers))
+    verified, notes = _verified(axes, answers)
+    key += verified
     if boundary is not None:
-        key += _outline(axes, boundary)
+        outline, more = _outline(axes, boundary)
+        key, notes = key + outline, notes + more
     if ke_liner is not None:
         key.append(_liner(axes, ke_liner))
     if worst is not None:
         key.append(_pointer(axes, worst))
-    _legend(figure, key)
+    _legend(figure, key, "; ".join(notes))
     return _png(figure)
 
 
@@ -147,7 +149,8 @@ def ranking_png(report: ScreeningReport) -> bytes:
         said = (
             f"none below {ke:,.0f}" if row.worst is None else f"{ke:,.0f} at {row.worst.speed_rpm:,.0f} rpm"
         )
-        axes.annotate(said, (ke, i), (5, 0), textcoords="offset points", va="center", fontsize=9, bbox=_WHITE)
+        beside: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points", "va": "center"}
+        axes.annotate(said, (ke, i), **beside, fontsize=9, bbox=_WHITE, zorder=4)  # over the liner's line
     axes.set_yticks(range(len(rows)), [f"{row.blade.name}, {row.contact_name}" for row in rows])
     axes.invert_yaxis()
     axes.set_xlim(0, 1.42 * max(row.ke_max if row.worst is None else row.worst.ke for row in rows))
@@ -203,17 +206,15 @@ def _scaled_by(factor: float) -> Callable[[Any], Any]:
     return lambda values: np.asarray(values) * factor
 
 
-def _verified(axes: Axes, answers: MapAnswers) -> Patch | Line2D:
-    """A tint on the points the exact core answered; its key."""
+def _verified(axes: Axes, answers: MapAnswers) -> tuple[list[Patch | Line2D], list[str]]:
+    """A tint on the points the exact core answered; its key, or a note where one of them answered all."""
     exact = answers.source == EXACT
     if exact.all() or not exact.any():
-        said = "every point by the exact core" if exact.all() else "surrogate only, none verified"
-        return Line2D([], [], ls="none", label=said)
+        return [], [f"every point of the map answered by the {'exact core' if exact.all() else 'surrogate'}"]
     tint = np.ma.masked_where(~exact, np.ones(exact.shape))
     axes.pcolormesh(answers.speed_hz, answers.ke, tint, cmap=ListedColormap([_VERIFIED]), shading="nearest")
-    return Patch(
-        facecolor=_VERIFIED, edgecolor="black", lw=0.8, label=f"verified exactly ({answers.exact_share:.1%})"
-    )
+    said = f"verified exactly ({answers.exact_share:.1%})"
+    return [Patch(facecolor=_VERIFIED, edgecolor="black", lw=0.8, label=said)], []
 
 
 def _liner(axes: Axes, ke_liner: float) -> Line2D:
@@ -230,22 +231,27 @@ def _pointer(axes: Axes, worst: CriticalSpeed) -> Line2D:
     return mark
 
 
-def _outline(axes: Axes, boundary: BoundaryAnswers) -> list[Patch | Line2D]:
-    """Edges of the unstable intervals where they are known, else the first crossing."""
+def _outline(axes: Axes, boundary: BoundaryAnswers) -> tuple[list[Patch | Line2D], list[str]]:
+    """Edges of the unstable intervals where they are known, else the first crossing; key and notes."""
     exact = boundary.source == EXACT
+    top = axes.get_ylim()[1]
+    axes.add_collection(LineCollection(list(_edges(boundary)), colors="black", linewidths=0.8))
+    # Up to the exact neighbours, so that the line has no gaps.
+    inner = exact & np.r_[exact[1:], True] & np.r_[True, exact[:-1]]
+    guessed = np.where(inner, np.nan, boundary.critical_ke)
+    (dashed,) = axes.plot(boundary.speed_hz, guessed, color="black", lw=0.9, ls="--")
+    dashed.set_label("surrogate's boundary")
+    drawn = boundary.critical_ke <= top
+    if not drawn.any():
+        by = "the exact core" if exact.all() else "the surrogate" if not exact.any() else "both"
+        return [], [f"boundary: none below {top:,.0f} N/m, by {by}"]
     key: list[Patch | Line2D] = []
-    if exact.any():
-        axes.add_collection(LineCollection(list(_edges(boundary)), colors="black", linewidths=0.8))
-        if _reaches(boundary, axes.get_ylim()[1]):
-            key.append(Line2D([], [], color="black", lw=0.9, label="exact boundary"))
-        else:
-            key.append(Line2D([], [], ls="none", label="boundary: none, exactly"))
-    if not exact.all():
-        # Up to the exact neighbours, so that the line has no gaps.
-        inner = exact & np.r_[exact[1:], True] & np.r_[True, exact[:-1]]
-        ke = np.where(inner, np.nan, boundary.critical_ke)
-        key += axes.plot(boundary.speed_hz, ke, color="black", lw=0.9, ls="--", label="surrogate's boundary")
-    return key
+    if (drawn & inner).any():
+        said = "exact boundary" if exact[drawn].all() else "boundary"
+        key.append(Line2D([], [], color="black", lw=0.9, label=said))
+    if (guessed <= top).any():
+        key.append(dashed)
+    return key, []
 
 
 def _edges(boundary: BoundaryAnswers) -> Iterator[np.ndarray]:
@@ -283,12 +289,14 @@ def _reaches(boundary: BoundaryAnswers, top: float) -> bool:
     return bool((boundary.critical_ke <= top).any())
 
 
-def _legend(figure: Figure, key: list[Patch | Line2D]) -> None:
-    """Under the axes, where it hides nothing."""
+def _legend(figure: Figure, key: list[Patch | Line2D], note: str = "") -> None:
+    """Under the axes, where it hides nothing; what has no mark to explain is a line above it."""
     # A map's long keys fit in three columns, the names of contacts in four.
     columns = 3 if len(key) > 4 else len(key)
     figure.legend(
         handles=key,
+        title=note or None,
+        title_fontsize=9,
         loc="outside lower center",
         ncols=columns,
         fontsize=9,

@@ -10,6 +10,7 @@ import numpy as np
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
+from sdm_core.errors import InvalidInput
 from service.speeds import evenly_timed
 from training.answers import BoundaryAnswers
 
@@ -61,11 +62,26 @@ def lobe_grid(blade: Blade, contact: ContactConfiguration, even_hz: np.ndarray, 
 
     Evenly spaced in 1/Ω, as lobes are, from end to end of `even_hz`, and those of `even_hz`: the
     abscissa of a map, rising. They draw the steep flanks of the wide lobes at high speed.
+
+    Raises
+    ------
+    InvalidInput
+        When so many lobes lie in the range that `MOST_SPEEDS` would pass some by.
     """
     low_hz, high_hz = float(even_hz[0]), float(even_hz[-1])
     highest = _highest_frequency(blade, contact, ke_max)
     lobes = highest * (1.0 / low_hz - 1.0 / high_hz)
-    count = int(np.clip(np.ceil(SPEEDS_PER_LOBE * lobes), FEWEST_SPEEDS, MOST_SPEEDS))
+    count = max(int(np.ceil(SPEEDS_PER_LOBE * lobes)), FEWEST_SPEEDS)
+    if count > MOST_SPEEDS:
+        most = MOST_SPEEDS // SPEEDS_PER_LOBE
+        # Rounded up, so that the number shown is accepted.
+        least = np.ceil(1e3 / (most / highest + 1.0 / high_hz)) / 1e3
+        raise InvalidInput(
+            "speed",
+            f"{low_hz:g} to {high_hz:g} Hz",
+            f"narrow it, e.g. from {least:.10g} Hz: {lobes:.0f} lobes of the mode at {highest:.6g} Hz lie "
+            f"in it, and at most {most} can be followed",
+        )
     rising = np.union1d(evenly_timed(low_hz, high_hz, count), even_hz)
     return rising[np.concatenate(([True], np.diff(rising) > 1e-9 * high_hz))]
 

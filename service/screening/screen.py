@@ -14,7 +14,7 @@ from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number
 from service.answerer import Answerer
 from service.screening.lobe_tips import CriticalSpeed, lobe_grid
-from service.screening.sweep import Progress, searched
+from service.screening.sweep import Progress, searched, through_tips
 from service.speeds import SpeedRange, evenly_spaced, operating_range
 from training.answers import EXACT, BoundaryAnswers, MapAnswers
 
@@ -47,7 +47,7 @@ class ScreeningResult:
     verified_share
         Share of the map's points answered by the exact core.
     boundary
-        Over the range, up to somewhat above `ke_max`, so that no lobe below it is missed.
+        Over the range and at the tips, up to somewhat above `ke_max`, so that no lobe below it is missed.
     map
         Verdicts over the range, up to `ke_max`.
     """
@@ -214,6 +214,7 @@ def screen(
         speed_hz = evenly_spaced(*speeds, columns)
         sweep = lobe_grid(blade, contact, speed_hz, ke_max)
         boundary, tips = searched(answerer, blade, contact, sweep, ke_max, sweep_policy or policy)
+        boundary = through_tips(answerer, blade, contact, boundary, tips)
         verdicts = answerer.map(blade, contact, speed_hz, np.linspace(0.0, ke_max, rows), policy=policy)
         shares = verdicts.unstable_share, verdicts.exact_share
         results.append(

@@ -90,6 +90,29 @@ def swept(
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
+def through_tips(
+    answerer: Answerer,
+    blade: Blade,
+    contact: ContactConfiguration,
+    boundary: BoundaryAnswers,
+    tips: Sequence[CriticalSpeed],
+) -> BoundaryAnswers:
+    """The same boundary with the exact core's answers at the lobes' tips, which a line then reaches."""
+    at = np.array([tip.speed_hz for tip in tips if not (boundary.speed_hz == tip.speed_hz).any()])
+    if not len(at):
+        return boundary
+    joined = _joined([boundary, answerer.boundary(blade, contact, at, boundary.ke_max, policy="exact")])
+    rising = np.argsort(joined.speed_hz)
+    return replace(
+        joined,
+        unstable_ke=tuple(joined.unstable_ke[i] for i in rising),
+        **{
+            name: getattr(joined, name)[rising]
+            for name in ("speed_hz", "critical_ke", "chatter_hz", "error_estimate", "source", "reason")
+        },
+    )
+
+
 def cut_off(answers: BoundaryAnswers, ke_max: float) -> BoundaryAnswers:
     """The same boundary, looked for only up to `ke_max`."""
     beyond = ~(answers.critical_ke <= ke_max)

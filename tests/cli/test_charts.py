@@ -8,8 +8,10 @@ from dataclasses import replace
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from sdm_core.contact import ContactConfiguration
+from service.screening import charts
 from service.screening.charts import boundaries_png, described, map_png, ranking_png
 from service.screening.screen import screen
 
@@ -57,6 +59,32 @@ def test_a_boundary_is_drawn_whoever_answered_it(blade, lobes, policy):
     lined = map_png(blade, LE, answers, lobes.boundary(blade, LE, SPEEDS, 2.5e4, policy))
     black = [float(np.mean(pixels(png).max(axis=-1) < 0.3)) for png in (bare, lined)]
     assert black[1] > black[0]
+
+
+@pytest.mark.parametrize(
+    ("exact", "labels"),
+    [
+        (slice(None), ["exact boundary"]),
+        (slice(0, 20), ["boundary", "surrogate's boundary"]),
+        (slice(0, 0), ["surrogate's boundary"]),
+    ],
+)
+def test_a_boundary_is_called_exact_only_where_all_of_it_is(lobes, blade, exact, labels):
+    boundary = lobes.boundary(blade, LE, SPEEDS, 2.5e4, "exact")
+    boundary.source[:] = [("exact" if i in range(40)[exact] else "surrogate") for i in range(40)]
+    axes = Figure().add_subplot()
+    axes.set_ylim(0.0, 2.5e4)
+    key, notes = charts._outline(axes, boundary)
+    assert [line.get_label() for line in key] == labels
+    assert notes == []
+
+
+def test_no_boundary_is_a_note_not_a_key_without_a_mark(lobes, blade):
+    axes = Figure().add_subplot()
+    axes.set_ylim(0.0, 1000.0)
+    key, notes = charts._outline(axes, lobes.boundary(blade, LE, SPEEDS, 1000.0, "exact"))
+    assert key == []
+    assert notes == ["boundary: none below 1,000 N/m, by the exact core"]
 
 
 def test_boundaries_without_any_crossing_are_still_a_chart(blade, lobes):

@@ -105,6 +105,33 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypat
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
 
 
+def test_what_a_link_points_to_is_written_and_the_link_stays(tmp_path):
+    (tmp_path / "link").symlink_to("real.json")
+    for content in (b"first", b"second"):
+        outputs.write_bytes("--json", tmp_path / "link", content)
+        assert (tmp_path / "real.json").read_bytes() == content
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_a_pipe_is_written_to_not_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        outputs.check_writable(png=str(pipe))
+        outputs.write_bytes("--png", pipe, b"chart")
+        assert os.read(reader, 100) == b"chart"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+
+
+def test_a_bar_that_nobody_watches_leaves_no_empty_line(capsys):
+    with outputs.progress_bar("boundary") as show:
+        show(1, 2, "half")
+    assert capsys.readouterr().err == ""
+
+
 def test_a_written_file_is_readable_by_others(tmp_path):
     outputs.write_bytes("--json", tmp_path / "a.json", b"{}")
     plain = tmp_path / "b.json"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 
 import pytest
 
@@ -125,6 +126,38 @@ def test_an_output_that_is_a_folder_is_refused(rubscreen, tmp_path):
     assert_refused(rubscreen("map", ROTOR, "--png", str(tmp_path)), "--png", str(tmp_path), "folder")
 
 
+@pytest.mark.parametrize("name", ["x", "link", "./x"])
+def test_two_outputs_in_one_file_are_refused(rubscreen, tmp_path, name):
+    (tmp_path / "link").symlink_to(tmp_path / "x")
+    other = f"{tmp_path}/{name}"
+    result = rubscreen("map", ROTOR, "--json", str(tmp_path / "x"), "--png", other)
+    assert_refused(result, "--png", other, "another path")
+
+
+def test_an_output_over_the_blade_read_is_refused(rubscreen, tmp_path, rotor):
+    path = blade_file(tmp_path, json.dumps(rotor))
+    for command in ("map", "boundary", "screen"):
+        assert_refused(rubscreen(command, path, "--json", path), "--json", path, "blade file")
+
+
+@pytest.mark.parametrize("command", ["map", "boundary", "screen"])
+@pytest.mark.parametrize(
+    ("options", "field", "value", "remedy"),
+    [
+        (["--speed", "1Hz:10Hz"], "--speed", "1.0", "at least 6.16"),
+        (["--ke-max", "1e9"], "--ke-max", "1000000000.0", "at most"),
+    ],
+)
+def test_what_would_take_hours_is_refused(rubscreen, command, options, field, value, remedy):
+    assert_refused(rubscreen(command, ROTOR, *options), field, value, remedy)
+
+
+@pytest.mark.parametrize("command", ["boundary", "screen"])
+def test_more_lobes_than_can_be_followed_are_refused(rubscreen, command):
+    result = rubscreen(command, ROTOR, "--speed", "7Hz:300Hz")
+    assert_refused(result, "--speed", "7 to 300 Hz", "narrow it")
+
+
 def test_only_json_goes_to_stdout(rubscreen):
     assert_refused(rubscreen("map", ROTOR, "--png", "-"), "--png", "-", "only --json")
 
@@ -138,3 +171,16 @@ def test_an_unknown_policy_is_refused(rubscreen):
 
 def test_a_port_that_cannot_be_is_refused(rubscreen):
     assert_refused(rubscreen("serve", "--port", "70000"), "--port", "70000", "65535")
+
+
+def test_an_address_of_another_machine_is_refused_as_the_host(rubscreen):
+    result = rubscreen("serve", "--host", "192.0.2.1", "--port", "0")
+    assert_refused(result, "--host", "192.0.2.1", "address of this machine")
+
+
+def test_a_port_in_use_is_refused_as_the_port(rubscreen):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert_refused(rubscreen("serve", "--port", port), "--port", port, "free port")

@@ -45,9 +45,17 @@ def test_tips_take_a_few_exact_calls_of_at_most_nine_speeds_a_lobe(blade, lobes)
 
 def test_tips_are_exact_even_where_the_surrogate_sweeps(blade, lobes):
     result = screen([blade], LE, lobes).results[0]
-    assert (result.boundary.source == "surrogate").all()
+    at_tips = np.isin(result.boundary.speed_hz, [tip.speed_hz for tip in result.critical_speeds])
+    assert (result.boundary.source[~at_tips] == "surrogate").all()
     assert result.worst.proven
     assert result.worst.error_estimate < 1e-4
+
+
+def test_the_boundary_drawn_reaches_the_least_point(blade, lobes):
+    boundary, worst = (row := screen([blade], LE, lobes).results[0]).boundary, row.worst
+    assert (np.diff(boundary.speed_hz) > 0).all()
+    assert boundary.speed_hz[np.nanargmin(boundary.critical_ke)] == worst.speed_hz
+    assert np.nanmin(boundary.critical_ke) == worst.ke
 
 
 def test_a_surrogate_that_sees_no_lobe_is_not_believed(blade, lobes):
@@ -166,6 +174,13 @@ def test_the_grid_puts_eight_speeds_on_every_lobe_of_the_highest_mode(blade):
     assert grid[-1] == 210.0
     lobe = np.diff(600.0 / grid)
     assert np.abs(lobe).max() <= 1 / 8 + 1e-9
+
+
+def test_more_lobes_than_can_be_followed_are_refused_with_a_range_that_is_not(blade):
+    with pytest.raises(InvalidInput, match="narrow it") as refused:
+        lobe_grid(blade, LE["LE"], np.array([1.0, 210.0]), 2.5e4)
+    least = float(refused.value.remedy.split(" from ")[1].split()[0])
+    assert len(lobe_grid(blade, LE["LE"], np.array([least, 210.0]), 2.5e4)) > 1900
 
 
 def test_only_tips_below_ke_max_are_given(blade, lobes):

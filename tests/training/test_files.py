@@ -95,10 +95,12 @@ def test_a_card_cut_short_or_of_another_code_is_refused(models):
     path.write_text(text[: len(text) // 2])
     with pytest.raises(DamagedFile, match=r"card\.json"):
         load_model(folder=folder)
-    assert list_models(folder) == []
-    path.write_text(json.dumps({**json.loads(text), "features": ["other"]}))
-    with pytest.raises(DamagedFile, match="other features"):
-        load_model(folder=folder)
+    (entry,) = list_models(folder)
+    assert entry.active and "card.json" in entry.damage
+    for change in ({"features": ["other"]}, {"verification_band": {**BAND.to_dict(), "spreads": 0.0}}):
+        path.write_text(json.dumps({**json.loads(text), **change}, indent=1, sort_keys=True) + "\n")
+        with pytest.raises(DamagedFile, match="not the one written"):
+            load_model(folder=folder)
 
 
 @pytest.mark.parametrize("name", ["absent", "../models", "", "."])

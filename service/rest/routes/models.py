@@ -15,4 +15,8 @@ router = APIRouter(prefix="/v1", tags=["models"])
 @router.get("/models", responses=problems(500))
 def models(request: Request) -> Models:  # not async: it reads files
     """The surrogates there are, the one that answers first."""
-    return Models(models=[Model(id=m.id, active=m.active, card=m.card) for m in the_desk(request).models()])
+    return Models(
+        models=[
+            Model(id=m.id, active=m.active, card=m.card, damage=m.damage) for m in the_desk(request).models()
+        ]
+    )

@@ -40,7 +40,7 @@ async def is_it_stable(request: Request, body: TheBody) -> Response:
         found = answerer.points(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy)
         return replies.to_json(replies.points_to_dict(found))
 
-    return Response(await desk.work.run(answer), media_type=JSON)
+    return Response(await desk.work.run(answer, request), media_type=JSON)
 
 
 @router.post(
@@ -59,7 +59,7 @@ async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
         found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy)
         return replies.to_json(replies.boundary_to_dict(found))
 
-    return Response(await desk.work.run(answer), media_type=JSON)
+    return Response(await desk.work.run(answer, request), media_type=JSON)
 
 
 @router.post(
@@ -91,7 +91,7 @@ async def map_of_stability(request: Request, body: TheBody) -> Response:
             return _chart(answerer, ask, found)
         return replies.map_to_npz(found)
 
-    return Response(await desk.work.run(answer), media_type=form, headers={"Vary": "Accept"})
+    return Response(await desk.work.run(answer, request), media_type=form, headers={"Vary": "Accept"})
 
 
 def _chart(answerer: Answerer, ask: MapQuestion, found: MapAnswers) -> bytes:
