@@ -7,6 +7,7 @@ import os
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +19,7 @@ from sdm_core.errors import InvalidInput
 from service.rest.replies import to_json
 
 STDOUT = "-"
+PROGRESS_EVERY_S = 10.0
 
 
 def console_beside(json_path: str | None) -> Console:
@@ -152,17 +154,32 @@ ShowProgress = Callable[[int, int, str], None]
 
 @contextmanager
 def progress_bar(title: str, *, quiet: bool = False) -> Iterator[ShowProgress]:
-    """A bar on stderr, fed by (done, total, what is next)."""
+    """A bar on stderr, fed by (done, total, what is next); where nobody watches, a line now and then."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     console = Console(stderr=True)
-    # Where nobody watches, rich would leave an empty line behind.
-    disable = quiet or not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=disable) as bar:
+    if not quiet and not console.is_terminal:  # a log file: rich would leave an empty line, and no progress
+        yield _progress_lines(title)
+        return
+    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
         task = bar.add_task(title, total=None)
 
         def show(done: int, total: int, text: str) -> None:
             bar.update(task, completed=done, total=total, description=f"{title}: {text}")
 
         yield show
+
+
+def _progress_lines(title: str) -> ShowProgress:
+    """Says on stderr how far long work is, at most every `PROGRESS_EVERY_S`."""
+    started = said = time.monotonic()
+
+    def show(done: int, total: int, text: str) -> None:
+        nonlocal said
+        now = time.monotonic()
+        if now - said >= PROGRESS_EVERY_S:
+            said = now
+            print(f"{title}: {text} {done} of {total}, {now - started:.0f} s", file=sys.stderr, flush=True)
+
+    return show

@@ -146,3 +146,13 @@ def test_version_and_help(rubscreen):
     shown = rubscreen("--help").stdout
     for command in ("demo", "serve", "screen", "map", "boundary", "train", "models"):
         assert command in shown
+
+
+def test_long_work_without_a_terminal_says_now_and_then_how_far_it_is(capsys, monkeypatch):
+    clock = iter([0.0, 3.0, 12.0, 14.0, 30.0])
+    monkeypatch.setattr(outputs.time, "monotonic", lambda: next(clock))
+    with outputs.progress_bar("train") as show:
+        for done in (1, 5, 6, 9):
+            show(done, 10, "fit")
+    said = capsys.readouterr().err.splitlines()
+    assert said == ["train: fit 5 of 10, 12 s", "train: fit 9 of 10, 30 s"]
