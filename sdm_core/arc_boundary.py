@@ -6,7 +6,6 @@ import numpy as np
 
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import Crossings
-from sdm_core.receptance import ContactReceptance
 from sdm_core.rubbing_blade import RubbingBlade
 
 SCAN_RATIO = 1.06  # between neighbouring stiffnesses: an island narrower than this can be missed
@@ -21,43 +20,45 @@ def least_destabilising_ke(problem: RubbingBlade) -> float:
     """
     if problem.contact_factor.shape[1] == 0:
         return np.inf
-    receptance = ContactReceptance(problem.omega, problem.damping_ratio, problem.contact_factor)
-    # ‖H(iω)‖ ≤ Σ_j |h_j(iω)| G_jj, and each |h_j| peaks within its own resonance.
-    peak = [problem.omega * np.sqrt(np.maximum(1 - 2 * problem.damping_ratio**2, 0.0))]
-    for offset in (0.5, 1.0, 2.0, 4.0, 16.0, 64.0):
-        peak += [problem.omega * (1 + offset * problem.damping_ratio)]
-        peak += [problem.omega * np.maximum(1 - offset * problem.damping_ratio, 0.0)]
-    gain = np.abs(receptance.modal(1j * np.concatenate(peak))) @ problem.contact_matrix.diagonal()
-    # Between the sampled frequencies the sum rises by less than a tenth of its peak.
-    return float(1.0 / (2.2 * gain.max())) if np.isfinite(gain.max()) else 0.0
+    # ‖H(iω)‖ ≤ Σ_j |h_j(iω)| G_jj, and |h_j| is at most 1/(2ξω²√(1 − ξ²)), or 1/ω² above ξ = 1/√2.
+    xi = np.minimum(problem.damping_ratio, np.sqrt(0.5))
+    peak = 1.0 / (2 * xi * np.sqrt(1 - xi**2) * problem.omega**2)
+    return float(1.0 / (2.0 * (peak * problem.contact_matrix.diagonal()).sum()))
 
 
 def arc_crossings(problem: RubbingBlade, ke_max: float) -> Crossings:
     """K_e up to `ke_max` at which the blade becomes unstable or stable again, at one speed.
 
     The verdict is proven by the argument principle at stiffnesses `SCAN_RATIO` apart from the
-    small-gain bound up; each change is bracketed and then solved to rounding.
+    small-gain bound up; each change is bracketed and then solved to rounding. Where one of those
+    verdicts cannot be decided the crossings are not `proven`.
     """
     low = least_destabilising_ke(problem)
     if low >= ke_max:
         return Crossings(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
     low = max(low, 1e-9 * ke_max)
     grid = np.geomspace(low, ke_max, 2 + int(np.log(ke_max / low) / np.log(SCAN_RATIO)))
-    unstable = [_unstable(problem, ke) for ke in grid]
+    verdicts = [_verdict(problem, ke) for ke in grid]
+    unstable = [verdict is not False for verdict in verdicts]  # not decided is never called stable
     found = []
     for i in range(len(unstable) - 1):
         if unstable[i] != unstable[i + 1]:
             found.append(_between(problem, grid[i], grid[i + 1], unstable[i + 1]))
     ke, frequency, direction, error = np.array(found).reshape(-1, 4).T
-    return Crossings(ke, frequency, direction, error)
+    return Crossings(ke, frequency, direction, error, proven=None not in verdicts)
 
 
-def _unstable(problem: RubbingBlade, ke: float) -> bool:
+def _verdict(problem: RubbingBlade, ke: float) -> bool | None:
+    """True where the blade is unstable; None where neither K_e nor its neighbours can be decided."""
     for nudge in (0.0, 1e-7, -1e-7, 1e-5):
         count = CharacteristicEquation(problem.with_ke(ke * (1 + nudge))).count_outside()
         if count is not None:
             return count > 0
-    return True  # not decided anywhere near: never called stable
+    return None
+
+
+def _unstable(problem: RubbingBlade, ke: float) -> bool:
+    return _verdict(problem, ke) is not False
 
 
 def _between(

@@ -60,7 +60,9 @@ class Engagement:
 
 @dataclass(frozen=True)
 class Sampled:
-    """Any function of time, averaged by Gauss-Legendre quadrature between its breaks.
+    """Any function of time, averaged by Gauss-Legendre quadrature over each interval.
+
+    Where the function jumps within an interval the mean is of first order only.
 
     Parameters
     ----------

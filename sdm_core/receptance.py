@@ -104,13 +104,13 @@ def swept(receptance: ContactReceptance, ke_max: float, tolerance: float = 1e-2)
     straight line and the branches can be told apart, except where no K_e ≤ `ke_max` has a root.
     """
     w = _first_grid(receptance, ke_max)
-    z = 1.0 / receptance.eigenvalues(w)
+    z = _dynamic_stiffness(receptance, w)
     left, right, z_left, z_right = w[:-1], w[1:], z[:-1], z[1:]
     done: list[tuple[np.ndarray, ...]] = []
     for _ in range(24):
         z_right, clear = _matched(z_left, z_right)
         middle = 0.5 * (left + right)
-        z_middle = 1.0 / receptance.eigenvalues(middle)
+        z_middle = _dynamic_stiffness(receptance, middle)
         line = 0.5 * (z_left + z_right)
         z_middle, _ = _matched(line, z_middle)
         size = np.minimum(np.abs(z_left), np.abs(z_right))
@@ -132,6 +132,12 @@ def swept(receptance: ContactReceptance, ke_max: float, tolerance: float = 1e-2)
     parts = [np.concatenate(column) for column in zip(*done, strict=True)]
     order = np.argsort(parts[0])
     return Sweep(*(part[order] for part in parts))
+
+
+def _dynamic_stiffness(receptance: ContactReceptance, w: np.ndarray) -> np.ndarray:
+    """1/λ(iω), bounded so that its square still fits a double; no K_e comes near the bound."""
+    lam = receptance.eigenvalues(w)
+    return 1.0 / np.where(np.abs(lam) < 1e-120, 1e-120, lam)
 
 
 def _first_grid(receptance: ContactReceptance, ke_max: float) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from named_problems import benchmark_blade, random_problem, receptance
 
+from sdm_core.arc_boundary import least_destabilising_ke
 from sdm_core.boundary import boundary, verdicts
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import crossings
@@ -118,3 +119,21 @@ def test_what_the_root_count_does_not_confirm_is_not_decided(monkeypatch):
     assert np.isnan(verdicts(blade, contact, speed, np.array([1e-3, 2.0]))).all()
     none_below = boundary(blade, contact, speed, 1e-6)
     assert np.isnan(none_below.critical_ke).all() and np.isinf(none_below.error_estimate).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_crossing_lies_below_the_small_gain_bound(seed):
+    # For one mode the bound is ξ√(1 − ξ²)ω²/φ², half of the smallest K_e over all speeds.
+    problem = random_problem(np.random.default_rng(seed))
+    bound = least_destabilising_ke(problem)
+    found = crossings(receptance(problem), problem.speed_hz, 100 * problem.ke)
+    assert bound > 0 and (found.ke > bound).all()
+    arcs = random_problem(np.random.default_rng(seed), ARCS["two arcs"])
+    assert stability(arcs.with_ke(0.999 * bound)).stable is True
+
+
+def test_an_arc_boundary_with_an_undecided_verdict_is_not_proven(monkeypatch):
+    contact = ContactConfiguration({"tip": 1.0}, ARCS["one arc"])
+    monkeypatch.setattr(CharacteristicEquation, "count_outside", lambda self, radius=1.0: None)
+    found = boundary(benchmark_blade(), contact, np.array([0.23]), 1.0)
+    assert np.isinf(found.error_estimate).all()
