@@ -12,10 +12,19 @@ from sdm_core.errors import InvalidInput
 
 
 class Modulation(Protocol):
-    """A scalar function of time, given by its exact means over intervals."""
+    """A scalar periodic function of time: its values, its means over intervals, where it is not smooth."""
 
     def mean(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Mean over each [start, end], seconds, shape (N,)."""
+        ...
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Values at times t, seconds, shape as t; at a break either side's."""
+        ...
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times within one period, seconds, between which the function is smooth."""
         ...
 
 
@@ -28,6 +37,52 @@ class Cosine:
     def mean(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         rate = 2 * np.pi / self.period
         return (np.sin(rate * end) - np.sin(rate * start)) / (rate * (end - start))
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        return np.cos(2 * np.pi / self.period * t)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return ()
+
+
+@dataclass(frozen=True)
+class Fourier:
+    """mean + Σ_k cosine_k cos(2πkt/period) + sine_k sin(2πkt/period), k from 1.
+
+    Parameters
+    ----------
+    average
+        Mean over a period.
+    cosine, sine
+        Coefficients of equal number.
+    period
+        s.
+    """
+
+    average: float
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    period: float
+
+    @property
+    def _rates(self) -> np.ndarray:
+        return 2 * np.pi / self.period * np.arange(1, len(self.cosine) + 1)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        phase = np.asarray(t)[..., None] * self._rates
+        return self.average + np.cos(phase) @ np.array(self.cosine) + np.sin(phase) @ np.array(self.sine)
+
+    def mean(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        def integral(t: np.ndarray) -> np.ndarray:
+            phase = t[..., None] * self._rates
+            return np.sin(phase) @ (self.cosine / self._rates) - np.cos(phase) @ (self.sine / self._rates)
+
+        return self.average + (integral(end) - integral(start)) / (end - start)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return ()
 
 
 @dataclass(frozen=True)
@@ -47,6 +102,18 @@ class Engagement:
 
     def mean(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         return (self._engaged_time(end) - self._engaged_time(start)) / (end - start)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        inside = np.mod(np.asarray(t) / self.period, 1.0)
+        engaged = np.zeros(inside.shape)
+        for a, b in self.arcs:
+            engaged[((inside >= a) & (inside < b)) | (inside < b - 1.0)] = 1.0
+        return engaged
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        edges = {float(np.mod(edge, 1.0)) for arc in self.arcs for edge in arc}
+        return tuple(sorted(edge * self.period for edge in edges if edge > 0))
 
     def _engaged_time(self, t: np.ndarray) -> np.ndarray:
         turn = np.floor(t / self.period)
@@ -70,15 +137,21 @@ class Sampled:
         Takes and returns arrays of equal shape.
     order
         Points per interval.
+    breaks
+        Times within one period, s, at which the function or one of its derivatives jumps.
     """
 
     function: Callable[[np.ndarray], np.ndarray]
     order: int = 8
+    breaks: tuple[float, ...] = ()
 
     def mean(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         x, w = np.polynomial.legendre.leggauss(self.order)
         t = start[:, None] + (end - start)[:, None] * (x + 1) / 2
         return self.function(t) @ (w / 2)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        return self.function(np.asarray(t, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -93,6 +166,13 @@ class PeriodicMatrix:
         out = np.repeat(self.constant[None], len(start), axis=0)
         for modulation, matrix in self.terms:
             out = out + modulation.mean(start, end)[:, None, None] * matrix
+        return out
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Values at times t, shape (N, d, d)."""
+        out = np.repeat(self.constant[None], len(t), axis=0)
+        for modulation, matrix in self.terms:
+            out = out + modulation.at(t)[:, None, None] * matrix
         return out
 
     @property
@@ -143,6 +223,14 @@ class DelayEquation:
     def is_constant(self) -> bool:
         """True when no coefficient depends on time."""
         return self.a.is_constant and self.b.is_constant
+
+    @property
+    def pieces(self) -> np.ndarray:
+        """Ends of the intervals of [0, τ] in which A and B are smooth, s, ascending from 0 to τ."""
+        inner = {
+            t for matrix in (self.a, self.b) for modulation, _ in matrix.terms for t in modulation.breaks
+        }
+        return np.array([0.0, *sorted(t for t in inner if 0 < t < self.tau), self.tau])
 
     @property
     def memory(self) -> np.ndarray:
@@ -241,6 +329,8 @@ def down_milling(
             total += np.where(cutting, force * np.sin(angle), 0.0)
         return total
 
+    # A tooth enters or leaves the cut where its angle passes one of the two; a period sees each once.
+    edges = [np.mod(angle, 2 * np.pi / teeth) / (2 * np.pi / teeth) * tau for angle in (entry, leave)]
     omega = 2 * np.pi * frequency_hz
     unit = np.ones((1, 1))
     return DelayEquation.of_second_order(
@@ -249,5 +339,7 @@ def down_milling(
         mass * omega**2 * unit,
         depth * unit,
         tau,
-        Sampled(directional),
+        Sampled(
+            directional, breaks=tuple(t for t in sorted(set(edges)) if 1e-12 * tau < t < (1 - 1e-12) * tau)
+        ),
     )
