@@ -5,42 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import expm
 
+from sdm_core.arc_propagation import ArcPropagation
+from sdm_core.contact_expansion import ArcSeries
 from sdm_core.interruption import checkpoint
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
 _MOST_POINTS = 60_000
+_FEW = 40  # points, for which building series does not pay
+_LARGEST_GROWTH = 1e11  # of an entry of M: what is smaller than its rounding error no longer shows
 _MOST_OSCILLATIONS = 200_000.0  # rad a revolution that the chatter frequency is looked for among
-
-
-class _Exponential:
-    """exp(A t) of many matrices at several t from one eigenvalue decomposition each.
-
-    Where eigenvectors are nearly parallel (two modes about to coalesce) scaling and squaring
-    takes over.
-    """
-
-    def __init__(self, a: np.ndarray) -> None:
-        self._a = a
-        self._rates, self._vectors = np.linalg.eig(a)
-        self._poor = np.ones(len(a), dtype=bool)
-        try:
-            self._inverse = np.linalg.inv(self._vectors)
-        except np.linalg.LinAlgError:
-            return
-        size = np.abs(self._inverse).sum(axis=1).max(axis=1) * np.abs(self._vectors).sum(axis=1).max(axis=1)
-        self._poor = ~(size < 1e6)
-
-    def over(self, t: float) -> np.ndarray:
-        """exp(A t), shape as A."""
-        if self._poor.all():
-            return expm(self._a * t)
-        out = (self._vectors * np.exp(self._rates * t)[:, None, :]) @ self._inverse
-        if self._poor.any():
-            out[self._poor] = expm(self._a[self._poor] * t)
-        return out
 
 
 @dataclass
@@ -63,73 +38,52 @@ class CharacteristicEquation:
     evaluations: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        p = self.problem
-        n = len(p.omega)
-        # State (x, ẋ/ω) scaled so that free motion is a rotation: entries of M stay of order one.
-        rate = np.zeros((2 * n, 2 * n))
-        rate[:n, n:] = np.diag(p.omega)
-        rate[n:, :n] = -np.diag(p.omega)
-        rate[n:, n:] = -np.diag(2 * p.damping_ratio * p.omega)
-        self._free = rate * p.tau
-        contact = np.zeros_like(rate)
-        contact[n:, :n] = p.ke * p.contact_matrix / p.omega[:, None]
-        self._contact = contact * p.tau
-        self._flights = {s.length: expm(self._free * s.length) for s in p.segments if not s.engaged}
+        self._motion = ArcPropagation.of([self.problem])
+        self._series: ArcSeries | None = None
 
     @property
     def size(self) -> int:
         """2n."""
-        return len(self._free)
+        return self._motion.size
 
     def fundamental(self, mu: np.ndarray) -> np.ndarray:
-        """M(μ), shape (m, 2n, 2n)."""
+        """M(μ), shape (m, 2n, 2n): by matrix exponentials."""
         mu = np.atleast_1d(np.asarray(mu, dtype=complex))
-        if len(mu) > self._chunk:
-            starts = range(0, len(mu), self._chunk)
-            return np.concatenate([self.fundamental(mu[i : i + self._chunk]) for i in starts])
+        self.evaluations += len(mu)
+        with np.errstate(all="ignore"):  # near μ = 0, an essential singularity
+            return self._motion.fundamental(np.zeros(len(mu), dtype=int), self.problem.ke * (1 / mu - 1))
+
+    def _fundamental_outside(self, mu: np.ndarray) -> np.ndarray:
+        """M(μ) for |μ| ≥ 1: by the series of each arc, several times faster."""
+        if len(mu) < _FEW and self._series is None:
+            return self.fundamental(mu)
+        if self._series is None:
+            self._series = ArcSeries.of(self._motion, self.problem.ke)
         checkpoint()
         self.evaluations += len(mu)
-        engaged = self._free + (1 / mu - 1)[:, None, None] * self._contact
-        out = np.broadcast_to(np.eye(self.size), engaged.shape)
-        with np.errstate(all="ignore"):  # near μ = 0, an essential singularity
-            grow = _Exponential(engaged)
-            for segment in self.problem.segments:
-                step = grow.over(segment.length) if segment.engaged else self._flights[segment.length]
-                out = step @ out
-        return out
+        return self._series.fundamental(self.problem.ke * (1 / mu - 1))
 
     def value(self, mu: np.ndarray) -> np.ndarray:
-        """det(I − M(μ)/μ), shape (m,)."""
+        """det(I − M(μ)/μ), shape (m,); NaN where M grows so much that rounding would hide a multiplier."""
         mu = np.atleast_1d(np.asarray(mu, dtype=complex))
-        with np.errstate(all="ignore"):
-            if self.problem.permanent:  # det(I − exp(L)/μ) = Π(1 − exp(l)/μ), l the eigenvalues of L
-                growth = np.exp(self._permanent_rates(mu))
-                return (1 - growth / mu[:, None]).prod(axis=1)
-            return np.linalg.det(np.eye(self.size) - self.fundamental(mu) / mu[:, None, None])
-
-    def _permanent_rates(self, mu: np.ndarray) -> np.ndarray:
-        self.evaluations += len(mu)
-        gain = (1 / mu - 1)[:, None, None]
-        pieces = []
-        for i in range(0, len(mu), self._chunk):
-            checkpoint()
-            pieces.append(np.linalg.eigvals(self._free + gain[i : i + self._chunk] * self._contact))
-        return np.concatenate(pieces)
-
-    @property
-    def _chunk(self) -> int:
-        """Matrices between two checkpoints: some tenths of a second of work."""
-        return max(1, int(4000 * (10 / self.size) ** 3))
+        out = np.empty(len(mu), dtype=complex)
+        chunk = max(1, int(4000 * (10 / self.size) ** 3))
+        outside = bool(self.problem.ke > 0 and (np.abs(mu) >= 1).all())
+        for i in range(0, len(mu), chunk):
+            part = mu[i : i + chunk]
+            m = self._fundamental_outside(part) if outside else self.fundamental(part)
+            with np.errstate(all="ignore"):
+                largest = np.abs(m).max(axis=(1, 2))
+                m = np.where((largest < _LARGEST_GROWTH)[:, None, None], m, np.nan)
+                out[i : i + chunk] = np.linalg.det(np.eye(self.size) - m / part[:, None, None])
+        return out
 
     def _candidates(self, mu: np.ndarray) -> np.ndarray:
         """Eigenvalues of M(μ), shape (m, 2n); rows that overflow are zero."""
+        matrices = self.fundamental(mu)
+        matrices[~np.isfinite(matrices).all(axis=(1, 2))] = 0.0
         with np.errstate(all="ignore"):
-            if self.problem.permanent:
-                nu = np.exp(self._permanent_rates(mu))
-            else:
-                matrices = self.fundamental(mu)
-                matrices[~np.isfinite(matrices).all(axis=(1, 2))] = 0.0
-                nu = np.linalg.eigvals(matrices)
+            nu = np.linalg.eigvals(matrices)
         return np.where(np.isfinite(nu), nu, 0.0)
 
     def count_outside(self, radius: float = 1.0) -> int | None:
@@ -154,7 +108,8 @@ class CharacteristicEquation:
         if angle is None or value is None:
             angle = np.linspace(0.0, np.pi, 4 * self._first_points(radius))
             value = self.value(radius * np.exp(1j * angle))
-        return complex(radius * np.exp(1j * angle[np.argmin(np.abs(value))]))
+        size = np.where(np.isfinite(value), np.abs(value), np.inf)
+        return complex(radius * np.exp(1j * angle[np.argmin(size)]))
 
     def _on_circle(self, radius: float) -> tuple[np.ndarray | None, np.ndarray | None]:
         angle = np.linspace(0.0, np.pi, self._first_points(radius))
@@ -173,6 +128,8 @@ class CharacteristicEquation:
                 return None, None
             middle = 0.5 * (angle[coarse] + angle[coarse + 1])
             new = self.value(radius * np.exp(1j * middle))
+            if not np.isfinite(new).all() or (new == 0).any():
+                return None, None
             hidden = np.angle(new / value[coarse]) + np.angle(value[coarse + 1] / new)
             hidden -= np.angle(value[coarse + 1] / value[coarse])
             fine = (np.abs(hidden) < 1.0) & (step[coarse] <= _LARGEST_STEP)
@@ -244,13 +201,14 @@ class CharacteristicEquation:
         if not fastest * p.tau < _MOST_OSCILLATIONS:
             return float("nan")
         samples = 64 * int(np.ceil(max(8.0, fastest * p.tau / 8)))
-        engaged = self._free + (1 / mu - 1) * self._contact
+        free, contact = self._rates()
+        engaged = free + (1 / mu - 1) * contact
         edges = np.cumsum([0.0, *(s.length for s in p.segments)])
         t = np.arange(samples) / samples
         motion = np.empty((samples, p.contact_factor.shape[1]), dtype=complex)
         for segment, start, end in zip(p.segments, edges[:-1], edges[1:], strict=True):
             inside = (t >= start - 1e-12) & (t < end - 1e-12)
-            rates, modes = np.linalg.eig(engaged if segment.engaged else self._free.astype(complex))
+            rates, modes = np.linalg.eig(engaged if segment.engaged else free.astype(complex))
             amplitude = np.linalg.solve(modes, state)
             history = modes[:n] @ (amplitude[:, None] * np.exp(rates[:, None] * (t[inside] - start)))
             motion[inside] = history.T @ p.contact_factor
@@ -259,6 +217,15 @@ class CharacteristicEquation:
         spectrum = (np.abs(np.fft.fft(periodic, axis=0)) ** 2).sum(axis=1)
         k = np.fft.fftfreq(samples, 1 / samples)[np.argmax(spectrum)]
         return float(abs(np.angle(mu) / (2 * np.pi) + k) * p.speed_hz)
+
+    def _rates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of free motion and of contact, per revolution, shape (2n, 2n) each."""
+        angle, n = self._motion.angle[0], len(self.problem.omega)
+        free, contact = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
+        free[:n, n:], free[n:, :n] = np.diag(angle), -np.diag(angle)
+        free[n:, n:] = -2 * np.diag(self.problem.damping_ratio * angle)
+        contact[n:, :n] = self.problem.ke * self._motion.coupling[0]
+        return free, contact
 
     def _starts(self, radius: float) -> list[np.ndarray]:
         """Starting points for Newton's method in batches, the most promising first."""

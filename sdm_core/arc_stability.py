@@ -1,0 +1,112 @@
+"""Leading multipliers and verdicts of many rubbing blades at once, arcs or permanent contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdm_core.arc_propagation import ArcPropagation
+from sdm_core.characteristic import CharacteristicEquation
+from sdm_core.contact_expansion import ContactExpansion
+from sdm_core.fredholm import leading_multipliers
+from sdm_core.interruption import checkpoint
+from sdm_core.rubbing_blade import RubbingBlade
+
+SERIES = "exact characteristic equation by its power series, argument principle"
+DIRECT = "exact characteristic equation point by point, argument principle"
+
+_LARGEST_EXPONENT = 10.0  # of the growth on the rim: e^10 costs four digits
+_REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
+_CHUNK = 500
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class BatchMultipliers:
+    """Dominant multipliers of many problems.
+
+    Attributes
+    ----------
+    multiplier
+        Of largest modulus, upper half-plane, shape (b,).
+    error_estimate
+        Relative error of its modulus; infinite where the proof did not succeed.
+    outside
+        Multipliers outside the unit circle, −1 where not decided.
+    by_series
+        False where the equation was solved point by point.
+    """
+
+    multiplier: np.ndarray
+    error_estimate: np.ndarray
+    outside: np.ndarray
+    by_series: np.ndarray
+
+    @property
+    def stable(self) -> np.ndarray:
+        """1.0 stable, 0.0 unstable, NaN not decided."""
+        return np.where(self.outside < 0, np.nan, (self.outside == 0).astype(float))
+
+
+def batch_multipliers(
+    problems: Sequence[RubbingBlade], *, dominant: bool = True, progress: Progress | None = None
+) -> BatchMultipliers:
+    """Dominant multiplier and number of unstable ones of each problem.
+
+    Problems with equally many modes are solved together, at most `_CHUNK` at a time.
+
+    Parameters
+    ----------
+    dominant
+        False where only the number of unstable ones is asked for: multipliers far inside the circle
+        are then not looked for, and come back as zero.
+    """
+    b = len(problems)
+    out = BatchMultipliers(
+        np.zeros(b, dtype=complex), np.full(b, np.inf), np.full(b, -1), np.zeros(b, dtype=bool)
+    )
+    modes = np.array([len(p.omega) for p in problems])
+    finished = 0
+    for n in np.unique(modes):
+        members = np.flatnonzero(modes == n)
+        for i in range(0, len(members), _CHUNK):
+            rows = members[i : i + _CHUNK]
+            _solve([problems[k] for k in rows], rows, out, dominant)
+            finished += len(rows)
+            if progress is not None:
+                progress(finished, b)
+    return out
+
+
+def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool) -> None:
+    motion = ArcPropagation.of(problems)
+    ke = np.array([p.ke for p in problems])
+    # Without contact the series is a constant: any tiny disc holds it.
+    centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
+    slowest = np.exp((motion.damping_ratio * motion.angle).min(axis=1))
+    todo = np.arange(len(problems))
+    for factor in _REACHES:
+        reach = factor * slowest[todo]
+        within = motion.phase_shift[todo] * centre[todo] * (1 + reach) < _LARGEST_EXPONENT
+        todo, reach = todo[within], reach[within]
+        if len(todo) == 0:
+            break
+        series = ContactExpansion.of(motion[todo], centre[todo], reach)
+        found = leading_multipliers(series, ke[todo])
+        decided = (found.outside >= 0) & ((found.multiplier[:, 0] != 0) | (not dominant))
+        at = rows[todo[decided]]
+        out.multiplier[at] = found.multiplier[decided, 0]
+        out.error_estimate[at] = found.error_estimate[decided, 0]
+        out.outside[at] = found.outside[decided]
+        out.by_series[at] = True
+        todo = todo[~decided]
+    for k in np.flatnonzero(~out.by_series[rows]):
+        checkpoint()
+        equation = CharacteristicEquation(problems[k])
+        count = equation.count_outside()
+        out.outside[rows[k]] = -1 if count is None else count
+        if dominant:
+            out.multiplier[rows[k]], out.error_estimate[rows[k]] = equation.dominant(count)

@@ -1,0 +1,211 @@
+"""Leading Floquet multipliers as the zeros of an entire function, many problems at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdm_core.contact_expansion import ContactExpansion
+from sdm_core.interruption import checkpoint
+
+_SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)
+_NEGLIGIBLE = 1e-13
+_NEAR_ONE = 1e-5  # of |ln |μ||: multipliers so near the circle are polished before they are counted
+_EPS = np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class LeadingMultipliers:
+    """Multipliers with |μ| ≥ 1/reach, largest modulus first, those of the lower half-plane left out.
+
+    Attributes
+    ----------
+    multiplier
+        μ, shape (b, l), zero where there are no more.
+    error_estimate
+        Relative error of each, shape (b, l); of those not polished, that of the series.
+    outside
+        Number outside the unit circle, both half-planes, shape (b,); −1 where not decided.
+    resolved
+        False where the series did not converge or its zeros could not be told apart, shape (b,).
+    """
+
+    multiplier: np.ndarray
+    error_estimate: np.ndarray
+    outside: np.ndarray
+    resolved: np.ndarray
+
+
+def leading_multipliers(
+    expansion: ContactExpansion, ke: np.ndarray, *, polished: int = 1
+) -> LeadingMultipliers:
+    """Zeros of q(u) = det(I − u M(K_e(u − 1))), u = 1/μ.
+
+    q is the Fredholm determinant of the monodromy operator: an entire function with q(0) = 1 and the
+    zeros 1/μ, the same number of times. Samples on the circle |u| = R give its power series by a
+    discrete Fourier transform, eigenvalues of a companion matrix its zeros inside, the argument
+    principle their number, and Newton's method on T(u)x = (I − uM)x = 0 their exact places.
+
+    Parameters
+    ----------
+    expansion
+        M(c) for each problem, b of them; R is its radius over its centre.
+    ke
+        K_e up to the expansion's centre, N/m, shape (b,).
+    polished
+        How many of the largest are made exact, besides all that lie near the unit circle.
+    """
+    reach = expansion.radius / expansion.centre
+    series, resolved = _series(expansion, ke, reach)
+    mu, counted = _zeros(series, reach)
+    resolved &= counted & expansion.resolved
+    error = np.where(mu != 0, 1e-8, 0.0)
+    modulus = np.abs(mu)
+    with np.errstate(divide="ignore"):
+        near = np.abs(np.log(np.where(modulus > 0, modulus, 1e-300))) < _NEAR_ONE
+    refine = (mu != 0) & (near | (np.arange(mu.shape[1]) < polished)) & resolved[:, None]
+    case, at = np.nonzero(refine)
+    if len(case):
+        mu[case, at], error[case, at] = _polished(expansion, ke, case, mu[case, at])
+    order = np.argsort(-np.abs(mu), axis=1, kind="stable")
+    mu, error = np.take_along_axis(mu, order, axis=1), np.take_along_axis(error, order, axis=1)
+    modulus = np.abs(mu)
+    touching = (np.abs(modulus - 1) <= error * modulus) & (mu != 0)
+    each = np.where(mu.imag == 0, 1, 2)
+    outside = np.where(touching.any(axis=1) | ~resolved, -1, ((modulus > 1) * each).sum(axis=1))
+    return LeadingMultipliers(mu, error, outside, resolved)
+
+
+def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of q in u/R, shape (b, samples), and whether they fell to rounding, shape (b,)."""
+    b, d = len(ke), expansion.coefficients.shape[-1]
+    out = np.zeros((b, _SAMPLES[0]))
+    resolved = np.zeros(b, dtype=bool)
+    todo = np.flatnonzero(expansion.resolved)
+    one = np.eye(d)
+    for samples in _SAMPLES:
+        if len(todo) == 0:
+            break
+        if samples < 2 * d:
+            continue
+        half = samples // 2 + 1
+        found = np.empty((len(todo), samples))
+        size = np.empty(len(todo))
+        chunk = max(1, int(3e5 / (half * d * d)))
+        for i in range(0, len(todo), chunk):
+            checkpoint()
+            rows = todo[i : i + chunk]
+            u = reach[rows, None] * np.exp(2j * np.pi * np.arange(half) / samples)
+            m = expansion[rows].fundamental(ke[rows, None] * (u - 1))
+            q = np.linalg.det(one - u[..., None, None] * m)
+            size[i : i + chunk] = np.abs(q).max(axis=1)
+            found[i : i + chunk] = np.fft.irfft(q.conj(), samples, axis=1)
+        tail = np.abs(found[:, -max(2, samples // 8) :]).max(axis=1)
+        done = tail <= np.maximum(_NEGLIGIBLE, 30 * expansion.noise[todo]) * size
+        if samples > out.shape[1]:
+            out = np.pad(out, ((0, 0), (0, samples - out.shape[1])))
+        out[todo[done], :samples] = found[done]
+        resolved[todo[done]] = True
+        todo = todo[~done]
+    return out, resolved
+
+
+def _zeros(series: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Multipliers of the upper half-plane with |μ| > 1/R, shape (b, l), and whether their number is right."""
+    b = len(series)
+    largest = np.maximum(np.abs(series).max(axis=1), 1e-300)
+    kept = np.abs(series) > 1e-15 * largest[:, None]
+    degree = series.shape[1] - 1 - np.argmax(kept[:, ::-1], axis=1)
+    roots = np.zeros((b, int(degree.max(initial=1))), dtype=complex)
+    padded = 4 * ((degree + 3) // 4)
+    for d in np.unique(padded[degree > 0]):
+        rows = np.flatnonzero((padded == d) & (degree > 0))
+        coefficients = series[rows, 1 : d + 1]
+        if coefficients.shape[1] < d:
+            coefficients = np.pad(coefficients, ((0, 0), (0, d - coefficients.shape[1])))
+        companion = np.zeros((len(rows), d, d))
+        companion[:, 0] = -coefficients / series[rows, :1]
+        companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
+        found = np.linalg.eigvals(companion)  # R μ
+        width = min(d, roots.shape[1])
+        order = np.argsort(-np.abs(found), axis=1, kind="stable")
+        roots[rows, :width] = np.take_along_axis(found, order, axis=1)[:, :width]
+    modulus = np.abs(roots)
+    # The circle on which zeros are counted runs through the widest gap between their moduli near the rim.
+    inside = np.where(modulus > 0.8, modulus, 0.8)
+    gaps = np.log(inside[:, :-1] / inside[:, 1:])
+    gaps[inside[:, :-1] > 1.25] = 0.0
+    widest = np.argmax(gaps, axis=1)
+    rows = np.arange(b)
+    rim = np.sqrt(inside[rows, widest] * inside[rows, np.minimum(widest + 1, inside.shape[1] - 1)])
+    rim = np.clip(rim, 1.0, 1.2)
+    counted = _winding(series, 1.0 / rim) == (modulus > rim[:, None]).sum(axis=1)
+    mu = roots / reach[:, None]
+    tiny = np.abs(mu.imag) <= 1e-9 * np.abs(mu)
+    mu = np.where(tiny, mu.real + 0j, mu)
+    mu = np.where((modulus > rim[:, None]) & (mu.imag >= 0), mu, 0.0)
+    order = np.argsort(-np.abs(mu), axis=1, kind="stable")
+    return np.take_along_axis(mu, order, axis=1)[
+        :, : max(1, int((mu != 0).sum(axis=1).max(initial=1)))
+    ], counted
+
+
+def _winding(series: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Zeros of the series inside |t| = radius, by the argument principle; −1 where not resolved."""
+    terms = series.shape[1]
+    scaled = series * radius[:, None] ** np.arange(terms)
+    values = np.fft.rfft(scaled, 16 * terms, axis=1).conj()
+    size = np.abs(values).max(axis=1)
+    turns = np.angle(values[:, 1:] / np.where(values[:, :-1] == 0, 1.0, values[:, :-1]))
+    good = (np.abs(turns).max(axis=1) < 0.8) & (np.abs(values).min(axis=1) > 1e-10 * size)
+    count = turns.sum(axis=1) / np.pi
+    return np.where(good & (np.abs(count - np.round(count)) < 1e-3), np.round(count), -1).astype(int)
+
+
+def _polished(
+    expansion: ContactExpansion, ke: np.ndarray, case: np.ndarray, mu: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Multipliers after Newton's method on T(u)x = 0, and their relative errors."""
+    u = 1.0 / mu
+    own, stiffness = expansion[case], ke[case]
+    d = expansion.coefficients.shape[-1]
+    rng = np.random.default_rng(d)
+    seed = rng.normal(size=(2, d)) + 1j * rng.normal(size=(2, d))
+    change = np.full(len(u), np.inf)
+    moved = np.zeros(len(u))
+    slope = np.ones(len(u))
+    for _ in range(4):
+        before = change
+        t, t_slope, scale = _pencil(own, stiffness, u)
+        x = np.linalg.solve(t, np.broadcast_to(seed[0][:, None], (len(u), d, 1)))
+        y = np.linalg.solve(t.conj().swapaxes(1, 2), np.broadcast_to(seed[1][:, None], (len(u), d, 1)))
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        y /= np.linalg.norm(y, axis=1, keepdims=True)
+        left = y.conj().swapaxes(1, 2)
+        slope = (left @ t_slope @ x)[:, 0, 0]
+        with np.errstate(all="ignore"):
+            step = (left @ t @ x)[:, 0, 0] / slope
+            step = np.where(np.isfinite(step), step, 0.0)
+            change = np.abs(step / u)
+        step *= np.minimum(1.0, 0.05 / np.maximum(change, 1e-300))
+        # A multiplier on the real axis stays there.
+        u = np.where(mu.imag == 0, (u - step).real, u - step)
+        moved += np.minimum(change, 0.05)
+        if (change < 1e-13).all() or (change >= before).all():
+            break
+    floor = 4 * (4 * _EPS + own.noise) * scale / np.maximum(np.abs(slope * u), 1e-300)
+    error = np.minimum(change, before) + floor
+    strayed = moved > 1e-3  # the series was better than that: Newton went to another multiplier
+    return 1.0 / u, np.where(strayed, np.inf, error)
+
+
+def _pencil(
+    expansion: ContactExpansion, ke: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T(u), dT/du and the size of u M, shapes (k, d, d), (k, d, d), (k,)."""
+    m, m_slope = expansion.fundamental_and_slope((ke * (u - 1))[:, None])
+    m, m_slope = m[:, 0], m_slope[:, 0]
+    t = np.eye(m.shape[-1]) * (1 + 1e-300) - u[:, None, None] * m
+    t_slope = -m - (u * ke)[:, None, None] * m_slope
+    return t, t_slope, np.abs(u) * np.maximum(expansion.size, 1.0)
