@@ -31,7 +31,7 @@ lint: $(VENV)/.installed-dev ## check style, formatting and types
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 
-bench: $(VENV)/.installed ## measure speed and accuracy
+bench: $(VENV)/.installed-bench ## measure against peers (ARGS="accuracy speed" for the other measurements)
 	@$(BIN)/python -m benchmarks $(ARGS)
 
 clean: ## remove the environment, caches and outputs
@@ -61,3 +61,8 @@ $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	@echo "installing rubscreen and what its development needs"
 	@$(PIP_INSTALL) --editable '.[dev]'
 	@touch $(VENV)/.installed $(VENV)/.installed-test $@
+
+$(VENV)/.installed-bench: pyproject.toml | $(BIN)/python
+	@echo "installing rubscreen and the peers it is measured against"
+	@$(PIP_INSTALL) --editable '.[bench]'
+	@touch $(VENV)/.installed $@

@@ -47,8 +47,11 @@ class BatchMultipliers:
 
     @property
     def stable(self) -> np.ndarray:
-        """1.0 stable, 0.0 unstable, NaN not decided."""
-        return np.where(self.outside < 0, np.nan, (self.outside == 0).astype(float))
+        """1.0 stable, 0.0 unstable, NaN not decided; one multiplier outside is enough to be unstable."""
+        modulus = np.abs(self.multiplier)
+        with np.errstate(invalid="ignore"):
+            unstable = (self.outside > 0) | (modulus * (1 - self.error_estimate) > 1)
+        return np.where(unstable, 0.0, np.where(self.outside == 0, 1.0, np.nan))
 
 
 def batch_multipliers(
@@ -86,14 +89,14 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
+    growth = motion.phase_shift * centre  # over a revolution, to first order, at |Im c| = K_e
     slowest = np.exp((motion.damping_ratio * motion.angle).min(axis=1))
-    todo = np.arange(len(problems))
+    todo = np.flatnonzero(growth * _REACHES[0] * slowest < _LARGEST_EXPONENT)
     for factor in _REACHES:
-        reach = factor * slowest[todo]
-        within = motion.phase_shift[todo] * centre[todo] * (1 + reach) < _LARGEST_EXPONENT
-        todo, reach = todo[within], reach[within]
         if len(todo) == 0:
             break
+        # At least as far as the circle, else the largest disc whose series holds its digits.
+        reach = np.maximum(_REACHES[0], np.minimum(factor * slowest[todo], _LARGEST_EXPONENT / growth[todo]))
         series = ContactExpansion.of(motion[todo], centre[todo], reach)
         found = leading_multipliers(series, ke[todo])
         decided = (found.outside >= 0) & ((found.multiplier[:, 0] != 0) | (not dominant))
@@ -103,10 +106,20 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         out.outside[at] = found.outside[decided]
         out.by_series[at] = True
         todo = todo[~decided]
-    for k in np.flatnonzero(~out.by_series[rows]):
+    rest = np.flatnonzero(~out.by_series[rows])
+    # Much contact: multipliers far outside the circle are found on a smaller disc, the others counted.
+    strong = rest[growth[rest] * _REACHES[0] >= 1.0]
+    if len(strong) and dominant:
+        reach = np.minimum(_LARGEST_EXPONENT / growth[strong], 0.99)
+        series = ContactExpansion.of(motion[strong], centre[strong], reach)
+        found = leading_multipliers(series, ke[strong])
+        far = found.resolved & (found.multiplier[:, 0] != 0)
+        out.multiplier[rows[strong[far]]] = found.multiplier[far, 0]
+        out.error_estimate[rows[strong[far]]] = found.error_estimate[far, 0]
+    for k in rest:
         checkpoint()
         equation = CharacteristicEquation(problems[k])
         count = equation.count_outside()
         out.outside[rows[k]] = -1 if count is None else count
-        if dominant:
+        if dominant and out.multiplier[rows[k]] == 0:
             out.multiplier[rows[k]], out.error_estimate[rows[k]] = equation.dominant(count)

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sdm_core.arc_boundary import arc_crossings
+from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade
-from sdm_core.closed_form import Crossings, crossings
+from sdm_core.closed_form import Crossings
 from sdm_core.contact import ContactConfiguration
 from sdm_core.interruption import checkpoint
-from sdm_core.receptance import ContactReceptance, Sweep, swept
+from sdm_core.permanent_boundary import permanent_crossings
 from sdm_core.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
-from sdm_core.stability import proven_verdict
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 
 CLOSED_FORM = "closed-form boundary, argument principle"
 CHARACTERISTIC = "exact characteristic equation, argument principle"
-_CHECK = 1e-4  # distance from a crossing, relative in K_e, at which the root count proves it
+_POINTS_AT_ONCE = 2000
 
 Progress = Callable[[int, int], None]
 
@@ -88,13 +88,15 @@ def boundary(
     speed = speeds("speed_hz", speed_hz)
     number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
     problems = RubbingBlade.at_speeds(blade, contact, speed, extrapolate=extrapolate)
-    sweeps = _SharedSweeps(blade)
     found: list[Crossings] = []
-    for i, problem in enumerate(problems):
-        checkpoint()
-        found.append(_crossings(problem, ke_max, sweeps))
-        if progress is not None:
-            progress(i + 1, len(problems))
+    if contact.permanent:
+        found = permanent_crossings(problems, ke_max, progress=progress, root_count=unstable_root_count)
+    else:
+        for i, problem in enumerate(problems):
+            checkpoint()
+            found.append(arc_crossings(problem, ke_max))
+            if progress is not None:
+                progress(i + 1, len(problems))
     return BoundarySolution(
         speed,
         float(ke_max),
@@ -117,60 +119,23 @@ def verdicts(
 ) -> np.ndarray:
     """Exact verdicts at points (speed, K_e): 1.0 stable, 0.0 unstable, NaN not decided; shape (m,).
 
-    In permanent contact the crossings at a speed decide all points of that speed at once.
+    In permanent contact the crossings at a speed decide all points of that speed at once; with arcs
+    the multipliers of many points are solved for together.
     """
     speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
     unique, index = np.unique(speed, return_inverse=True)
     problems = RubbingBlade.at_speeds(blade, contact, unique, extrapolate=extrapolate)
-    sweeps = _SharedSweeps(blade)
-    out = np.full(len(speed), np.nan)
-    order = np.argsort(index, kind="stable")
-    groups = np.split(order, np.searchsorted(index[order], np.arange(1, len(unique))))
-    done = 0
-    for problem, members in zip(problems, groups, strict=True):
+    if contact.permanent:
+        return _permanent_verdicts(problems, index, stiffness, progress)
+    out = np.empty(len(speed))
+    for start in range(0, len(speed), _POINTS_AT_ONCE):
         checkpoint()
-        if problem.permanent:
-            out[members] = _from_crossings(problem, stiffness[members], sweeps)
-        else:
-            for i in members:
-                verdict = proven_verdict(problem.with_ke(stiffness[i]))
-                out[i] = np.nan if verdict is None else float(verdict)
-        done += len(members)
+        part = slice(start, start + _POINTS_AT_ONCE)
+        points = [problems[i].with_ke(k) for i, k in zip(index[part], stiffness[part], strict=True)]
+        out[part] = batch_multipliers(points, dominant=False).stable
         if progress is not None:
-            progress(done, len(speed))
+            progress(min(start + _POINTS_AT_ONCE, len(speed)), len(speed))
     return out
-
-
-class _SharedSweeps:
-    """One sweep serves all speeds of a blade whose modes do not depend on speed."""
-
-    def __init__(self, blade: Blade) -> None:
-        self._shared = len(blade.states) == 1
-        self._sweep: Sweep | None = None
-        self._ke_max = 0.0
-
-    def of(self, receptance: ContactReceptance, ke_max: float) -> Sweep:
-        if not self._shared:
-            return swept(receptance, ke_max)
-        if self._sweep is None or self._ke_max < ke_max:
-            self._sweep, self._ke_max = swept(receptance, ke_max), ke_max
-        return self._sweep
-
-
-def _crossings(problem: RubbingBlade, ke_max: float, sweeps: _SharedSweeps) -> Crossings:
-    if not problem.permanent:
-        return arc_crossings(problem, ke_max)
-    receptance = ContactReceptance(problem.omega, problem.damping_ratio, problem.contact_factor)
-    if receptance.rank == 0:
-        return crossings(receptance, problem.speed_hz, ke_max)
-    found = crossings(receptance, problem.speed_hz, ke_max, sweep=sweeps.of(receptance, ke_max))
-    if _proven(receptance, problem.speed_hz, found, ke_max):
-        return found
-    finer = swept(receptance, ke_max, tolerance=1e-4)
-    found = crossings(receptance, problem.speed_hz, ke_max, sweep=finer)
-    if _proven(receptance, problem.speed_hz, found, ke_max):
-        return found
-    return replace(found, error_estimate=np.full(len(found.ke), np.inf), proven=False)
 
 
 def _first_error(found: Crossings) -> float:
@@ -179,34 +144,47 @@ def _first_error(found: Crossings) -> float:
     return float(found.error_estimate[0]) if len(found.ke) else 0.0
 
 
-def _proven(receptance: ContactReceptance, speed_hz: float, found: Crossings, ke_max: float) -> bool:
-    """The root count agrees below and above the first crossing, and at the largest K_e."""
-    if not found.consistent:
-        return False
-    first = found.ke[0] if len(found.ke) else ke_max
-    checks = np.array([first * (1 - _CHECK), first * (1 + _CHECK), ke_max])
-    if not len(found.ke):
-        checks = checks[2:]
-    expected = np.array([2 * found.direction[found.ke <= k].sum() for k in checks])
-    count = unstable_root_count(receptance, speed_hz, checks)
-    close = np.array([(np.abs(found.ke / k - 1) < 1e-6).any() for k in checks])
-    return bool(((count == expected) | close).all())
+def _permanent_verdicts(
+    problems: list[RubbingBlade], case: np.ndarray, ke: np.ndarray, progress: Progress | None
+) -> np.ndarray:
+    """Verdicts on points (case, K_e) from the crossings of each case, shape of `ke`."""
+    largest = np.zeros(len(problems))
+    np.maximum.at(largest, case, ke)
+    loaded = np.flatnonzero(largest)
+
+    def points_done(done: int, of: int) -> None:
+        if progress is not None:
+            progress(len(ke) * done // of, len(ke))
+
+    found = [Crossings.none()] * len(problems)
+    solved = permanent_crossings(
+        [problems[i] for i in loaded],
+        largest[loaded] * (1 + 1e-6),
+        progress=points_done,
+        root_count=unstable_root_count,
+    )
+    points_done(1, 1)
+    for i, crossings in zip(loaded, solved, strict=True):
+        found[i] = crossings
+    out = _between_crossings(found, case, ke)
+    # Without contact a damped blade is stable, an undamped one on the limit.
+    damped = np.array([(problem.damping_ratio > 0).all() for problem in problems])
+    return np.where(ke == 0, np.where(damped, 1.0, np.nan)[case], out)
 
 
-def _from_crossings(problem: RubbingBlade, ke: np.ndarray, sweeps: _SharedSweeps) -> np.ndarray:
-    if not (ke > 0).any():
-        return _unloaded(problem, ke)
-    found = _crossings(problem, float(ke.max()) * (1 + 1e-6), sweeps)
-    if not found.proven:
-        return np.full(len(ke), np.nan)
-    pairs = np.array([found.direction[found.ke <= k].sum() for k in ke])
-    out = np.where(pairs > 0, 0.0, 1.0)
-    for crossing, error in zip(found.ke, found.error_estimate, strict=True):
-        out[np.abs(ke - crossing) <= max(error, 1e-12) * crossing] = np.nan
-    return np.where(ke == 0, _unloaded(problem, ke), out)
-
-
-def _unloaded(problem: RubbingBlade, ke: np.ndarray) -> np.ndarray:
-    """Without contact a damped blade is stable, an undamped one on the limit."""
-    damped = bool((problem.damping_ratio > 0).all())
-    return np.full(len(ke), 1.0 if damped else np.nan)
+def _between_crossings(found: list[Crossings], case: np.ndarray, ke: np.ndarray) -> np.ndarray:
+    """1.0 with no unstable roots, 0.0 with some, NaN on a crossing or where the proof failed."""
+    number = np.array([len(crossings.ke) for crossings in found])
+    owner = np.repeat(np.arange(len(found)), number)
+    at = np.concatenate([crossings.ke for crossings in found])
+    width = np.clip(np.concatenate([crossings.error_estimate for crossings in found]), 1e-12, 1e3) * at
+    pairs = np.r_[0.0, np.cumsum(np.concatenate([crossings.direction for crossings in found]))]
+    # Complex numbers sort by real part, then imaginary part: by case, then by K_e.
+    point = case + 1j * ke
+    after = np.searchsorted(owner + 1j * at, point, side="right")
+    out = np.where(pairs[after] > pairs[(np.cumsum(number) - number)[case]], 0.0, 1.0)
+    below = np.r_[-1.0, np.maximum.accumulate(owner + 1j * (at + width))]
+    above = np.r_[np.minimum.accumulate((owner + 1j * (at - width))[::-1])[::-1], len(found)]
+    on_crossing = (point <= below[after]) | (point >= above[after])
+    proven = np.array([crossings.proven for crossings in found])
+    return np.where(on_crossing | ~proven[case], np.nan, out)

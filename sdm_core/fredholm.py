@@ -178,8 +178,10 @@ def _polished(
     for _ in range(4):
         before = change
         t, t_slope, scale = _pencil(own, stiffness, u)
-        x = np.linalg.solve(t, np.broadcast_to(seed[0][:, None], (len(u), d, 1)))
-        y = np.linalg.solve(t.conj().swapaxes(1, 2), np.broadcast_to(seed[1][:, None], (len(u), d, 1)))
+        # Inverse iteration; the shift, of the size of rounding, keeps an exact zero from dividing by zero.
+        shifted = t + (_EPS * scale)[:, None, None] * np.diag(1.0 + 0.5 * np.arange(d) / d)
+        x = np.linalg.solve(shifted, np.broadcast_to(seed[0][:, None], (len(u), d, 1)))
+        y = np.linalg.solve(shifted.conj().swapaxes(1, 2), np.broadcast_to(seed[1][:, None], (len(u), d, 1)))
         x /= np.linalg.norm(x, axis=1, keepdims=True)
         y /= np.linalg.norm(y, axis=1, keepdims=True)
         left = y.conj().swapaxes(1, 2)
@@ -206,6 +208,6 @@ def _pencil(
     """T(u), dT/du and the size of u M, shapes (k, d, d), (k, d, d), (k,)."""
     m, m_slope = expansion.fundamental_and_slope((ke * (u - 1))[:, None])
     m, m_slope = m[:, 0], m_slope[:, 0]
-    t = np.eye(m.shape[-1]) * (1 + 1e-300) - u[:, None, None] * m
+    t = np.eye(m.shape[-1]) - u[:, None, None] * m
     t_slope = -m - (u * ke)[:, None, None] * m_slope
     return t, t_slope, np.abs(u) * np.maximum(expansion.size, 1.0)

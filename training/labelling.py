@@ -9,15 +9,14 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from sdm_core.closed_form import crossings
+from sdm_core.contact import Segment
 from sdm_core.errors import RubscreenError
-from sdm_core.receptance import Sweep, swept
-from sdm_core.root_count import unstable_root_count
+from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.rubbing_blade import RubbingBlade
 from training.cases import CaseBatch
 
 KAPPA_MAX = 4.0
 _CHUNK = 512
-_AUDIT_EVERY = 16  # every so many labels, the root count must confirm the closed form
 
 Progress = Callable[[int, int], None]
 
@@ -29,7 +28,7 @@ class LabelAuditFailed(RubscreenError):
 def critical_kappa(cases: CaseBatch, *, workers: int = 2, progress: Progress | None = None) -> np.ndarray:
     """κ of the first crossing of each case, infinite where there is none up to `KAPPA_MAX`.
 
-    Closed form; one label in sixteen is audited by the root count on both sides.
+    Closed form, every label proven by the root count on both sides.
 
     Parameters
     ----------
@@ -73,25 +72,23 @@ def _label_chunk(cases: CaseBatch) -> np.ndarray:
 
 def _labels(cases: CaseBatch) -> np.ndarray:
     scale = cases.stiffness_scale
-    out = np.full(len(cases), np.inf)
-    sweep: Sweep | None = None
-    for i in range(len(cases)):
-        ke_max = KAPPA_MAX * scale[i]
-        same = i > 0 and all(
-            np.array_equal(getattr(cases, name)[i], getattr(cases, name)[i - 1])
-            for name in ("omega", "damping_ratio", "contact_matrix")
-        )
-        if not same:
-            receptance = cases.receptance(i)
-            sweep = swept(receptance, ke_max)
-        found = crossings(receptance, cases.speed_hz[i], ke_max, sweep=sweep, first_only=True)
-        if len(found.ke):
-            out[i] = found.ke[0] / scale[i]
-        if i % _AUDIT_EVERY == 0:
-            first = found.ke[0] if len(found.ke) else ke_max
-            count = unstable_root_count(receptance, cases.speed_hz[i], first * np.array([1 - 1e-4, 1 + 1e-4]))
-            if count[0] != 0 or (len(found.ke) and not count[1] > 0):
-                raise LabelAuditFailed(
-                    f"closed form says {first:g} N/m, root counts are {count} in {cases[i : i + 1]}"
-                )
-    return out
+    found = permanent_crossings([_problem(cases, i) for i in range(len(cases))], KAPPA_MAX * scale)
+    for i, crossings in enumerate(found):
+        if not crossings.proven:
+            raise LabelAuditFailed(
+                f"closed form says {crossings.ke[:1]} N/m, the root count contradicts, in {cases[i : i + 1]}"
+            )
+    return np.array([c.ke[0] / s if len(c.ke) else np.inf for c, s in zip(found, scale, strict=True)])
+
+
+def _problem(cases: CaseBatch, i: int) -> RubbingBlade:
+    receptance = cases.receptance(i)
+    return RubbingBlade(
+        receptance.omega,
+        receptance.damping_ratio,
+        receptance.factor.T,
+        float(cases.speed_hz[i]),
+        0.0,
+        None,
+        (Segment(1.0, True),),
+    )

@@ -148,7 +148,7 @@ def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
         "designs": s.designs,
         "speeds_each": s.speeds_each,
         "seed": s.seed,
-        "labels": "closed-form first crossing, one in sixteen audited by root count",
+        "labels": "closed-form first crossing, proven by root count",
         "kappa_max": KAPPA_MAX,
         "code_version": __version__,
     }

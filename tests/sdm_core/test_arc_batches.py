@@ -1,0 +1,108 @@
+"""Multipliers of many points at once, with arcs of contact, against independent methods."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from named_problems import benchmark_blade, random_problem
+from scipy.linalg import expm
+
+from sdm_core.arc_propagation import ArcPropagation, exponentials
+from sdm_core.arc_stability import batch_multipliers
+from sdm_core.boundary import verdicts
+from sdm_core.characteristic import CharacteristicEquation
+from sdm_core.collocation import Collocation
+from sdm_core.contact import ContactConfiguration
+from sdm_core.contact_expansion import ArcSeries, ContactExpansion
+from sdm_core.errors import Cancelled
+from sdm_core.interruption import interruptible
+from sdm_core.rubbing_blade import RubbingBlade
+
+
+def random_arcs(rng: np.random.Generator) -> list[list[float]]:
+    count, engaged = int(rng.integers(1, 5)), rng.uniform(0.05, 0.8)
+    lengths, gaps = rng.dirichlet(np.ones(count)) * engaged, rng.dirichlet(np.ones(count)) * (1 - engaged)
+    start = np.cumsum(np.r_[0.0, (lengths + gaps)[:-1]])
+    return [[float(a), float(a + length)] for a, length in zip(start, lengths, strict=True)]
+
+
+def random_problems(seed: int, count: int):
+    rng = np.random.default_rng(seed)
+    return [random_problem(rng, random_arcs(rng), kappa=10 ** rng.uniform(-4, -0.5)) for _ in range(count)]
+
+
+def test_exponentials_are_those_of_a_library():
+    rng = np.random.default_rng(0)
+    for size in (1.0, 30.0, 1000.0):
+        a = rng.normal(size=(20, 6, 6))
+        a = size * (a - a.swapaxes(1, 2)) / 6 + 1e-3j * rng.normal(size=(20, 6, 6))
+        np.testing.assert_allclose(exponentials(a), expm(a), atol=1e-14 * (10 + size))
+
+
+def test_multipliers_and_their_number_are_those_of_collocation():
+    problems = random_problems(1, 40)
+    found = batch_multipliers(problems)
+    assert (found.outside >= 0).all() and (found.error_estimate < 1e-9).all()
+    assert 5 < (found.outside > 0).sum() < 35  # both kinds are there
+    for problem, mu, outside in zip(problems, found.multiplier, found.outside, strict=True):
+        reference = Collocation(48).multipliers(problem, count=24)
+        assert abs(mu) == pytest.approx(np.abs(reference[0]), rel=1e-9)
+        assert outside == (np.abs(reference) > 1).sum()
+
+
+def test_a_batch_gives_what_each_point_gives_alone():
+    problems = random_problems(2, 30)
+    together = batch_multipliers(problems)
+    for i, problem in enumerate(problems):
+        alone = CharacteristicEquation(problem)
+        count = alone.count_outside()
+        mu, error = alone.dominant(count)
+        assert together.outside[i] == count
+        assert np.isinf(error) or abs(together.multiplier[i]) == pytest.approx(abs(mu), rel=1e-9)
+
+
+def test_both_series_give_the_fundamental_matrix_of_the_exponentials():
+    for problem in random_problems(3, 12):
+        motion = ArcPropagation.of([problem])
+        c = problem.ke * (np.exp(-1j * np.linspace(0, np.pi, 9)) - 1)
+        exact = motion.fundamental(np.zeros(9, dtype=int), c)
+        series = ContactExpansion.of(motion, np.array([problem.ke]), np.array([1.2]))
+        assert series.resolved.all()
+        np.testing.assert_allclose(series.fundamental(c[None])[0], exact, atol=1e-12 * series.size[0])
+        np.testing.assert_allclose(
+            ArcSeries.of(motion, problem.ke).fundamental(c), exact, atol=1e-12 * series.size[0]
+        )
+
+
+def test_without_contact_the_least_damped_mode_dominates():
+    problem = random_problems(4, 1)[0].with_ke(0.0)
+    found = batch_multipliers([problem])
+    rate = (problem.damping_ratio * problem.omega).min() * problem.tau
+    assert abs(found.multiplier[0]) == pytest.approx(np.exp(-rate), rel=1e-10)
+    assert found.stable[0] == 1.0
+
+
+def test_much_contact_is_proven_unstable_even_where_its_multipliers_are_not_counted():
+    problem = random_problem(np.random.default_rng(5), [[0.0, 0.7]], kappa=0.3)
+    slow = replace(problem, speed_hz=problem.speed_hz / 30).with_ke(3 * problem.ke)
+    found = batch_multipliers([slow])
+    assert found.stable[0] == 0.0 and abs(found.multiplier[0]) > 1
+
+
+@pytest.mark.parametrize("engaged", [0.3, 0.7])
+def test_verdicts_on_a_map_with_arcs_are_those_of_the_argument_principle(engaged):
+    blade, contact = benchmark_blade(), ContactConfiguration({"tip": 1.0}, [(0.1, 0.1 + engaged)])
+    speed, ke = (axis.ravel() for axis in np.meshgrid(np.linspace(0.05, 0.4, 12), np.geomspace(0.01, 4, 12)))
+    found = verdicts(blade, contact, speed, ke)
+    for s, k, stable in zip(speed, ke, found, strict=True):
+        count = CharacteristicEquation(RubbingBlade.from_blade(blade, contact, s, k)).count_outside()
+        assert stable == (count == 0)
+    assert 0.1 < found.mean() < 0.95
+
+
+def test_a_batch_with_arcs_can_be_cancelled():
+    def stop() -> None:
+        raise Cancelled("enough")
+
+    with interruptible(stop), pytest.raises(Cancelled):
+        batch_multipliers(random_problems(6, 3))
