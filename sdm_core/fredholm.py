@@ -178,10 +178,8 @@ def _polished(
     for _ in range(4):
         before = change
         t, t_slope, scale = _pencil(own, stiffness, u)
-        # Inverse iteration; the shift, of the size of rounding, keeps an exact zero from dividing by zero.
-        shifted = t + (_EPS * scale)[:, None, None] * np.diag(1.0 + 0.5 * np.arange(d) / d)
-        x = np.linalg.solve(shifted, np.broadcast_to(seed[0][:, None], (len(u), d, 1)))
-        y = np.linalg.solve(shifted.conj().swapaxes(1, 2), np.broadcast_to(seed[1][:, None], (len(u), d, 1)))
+        x = _inverse_step(t, seed[0], scale)
+        y = _inverse_step(t.conj().swapaxes(1, 2), seed[1], scale)
         x /= np.linalg.norm(x, axis=1, keepdims=True)
         y /= np.linalg.norm(y, axis=1, keepdims=True)
         left = y.conj().swapaxes(1, 2)
@@ -200,6 +198,22 @@ def _polished(
     error = np.minimum(change, before) + floor
     strayed = moved > 1e-3  # the series was better than that: Newton went to another multiplier
     return 1.0 / u, np.where(strayed, np.inf, error)
+
+
+def _inverse_step(t: np.ndarray, seed: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """t⁻¹ seed, shape (k, d, 1): one step of inverse iteration.
+
+    A small shift keeps a matrix that is singular to the last bit from dividing by zero.
+    """
+    d = t.shape[-1]
+    side = np.broadcast_to(seed[:, None], (len(t), d, 1))
+    shift = np.diag(np.exp(1j * np.arange(1, d + 1)))
+    for size in (0.0, 1e-15, 1e-14, 1e-13):
+        try:
+            return np.linalg.solve(t + (size * scale)[:, None, None] * shift, side)
+        except np.linalg.LinAlgError:
+            continue
+    return np.linalg.pinv(t) @ side
 
 
 def _pencil(

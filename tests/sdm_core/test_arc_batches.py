@@ -106,3 +106,10 @@ def test_a_batch_with_arcs_can_be_cancelled():
 
     with interruptible(stop), pytest.raises(Cancelled):
         batch_multipliers(random_problems(6, 3))
+
+
+def test_points_without_contact_among_others_are_answered():
+    # At K_e = 0 modes do not couple and the matrix of Newton's method can be singular to the last bit.
+    blade, contact = benchmark_blade(), ContactConfiguration({"tip": 1.0}, [(0.0, 0.25), (0.5, 0.75)])
+    speed = np.linspace(0.02, 0.45, 200)
+    assert (verdicts(blade, contact, speed, np.zeros(200)) == 1.0).all()
