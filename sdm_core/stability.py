@@ -109,12 +109,6 @@ def stability(
     return _solution(found.multiplier, found.error_estimate, stable, None, np.nan, name, found.steps)
 
 
-def proven_verdict(problem: RubbingBlade) -> bool | None:
-    """Stable or not by the argument principle alone: the cheapest proof at one point."""
-    count = CharacteristicEquation(problem).count_outside()
-    return None if count is None else count == 0
-
-
 def _by_characteristic(problem: RubbingBlade) -> StabilitySolution:
     equation = CharacteristicEquation(problem)
     count = equation.count_outside()
