@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sdm_core.arc_stability import batch_multipliers
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import Crossings
 from sdm_core.rubbing_blade import RubbingBlade
@@ -54,7 +55,9 @@ def _verdict(problem: RubbingBlade, ke: float) -> bool | None:
         count = CharacteristicEquation(problem.with_ke(ke * (1 + nudge))).count_outside()
         if count is not None:
             return count > 0
-    return None
+    # So strong a contact that multipliers cannot be counted: one far outside is proof enough.
+    stable = batch_multipliers([problem.with_ke(ke)], dominant=False).stable[0]
+    return None if np.isnan(stable) else bool(stable == 0.0)
 
 
 def _unstable(problem: RubbingBlade, ke: float) -> bool:

@@ -14,9 +14,6 @@ from sdm_core.fredholm import leading_multipliers
 from sdm_core.interruption import checkpoint
 from sdm_core.rubbing_blade import RubbingBlade
 
-SERIES = "exact characteristic equation by its power series, argument principle"
-DIRECT = "exact characteristic equation point by point, argument principle"
-
 _LARGEST_EXPONENT = 10.0  # of the growth on the rim: e^10 costs four digits
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
 _CHUNK = 500
@@ -89,7 +86,9 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
-    growth = motion.phase_shift * centre  # over a revolution, to first order, at |Im c| = K_e
+    growth = np.maximum(
+        motion.phase_shift * centre, 1e-300
+    )  # over a revolution, to first order, at |Im c| = K_e
     slowest = np.exp((motion.damping_ratio * motion.angle).min(axis=1))
     todo = np.flatnonzero(growth * _REACHES[0] * slowest < _LARGEST_EXPONENT)
     for factor in _REACHES:
@@ -107,19 +106,24 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         out.by_series[at] = True
         todo = todo[~decided]
     rest = np.flatnonzero(~out.by_series[rows])
-    # Much contact: multipliers far outside the circle are found on a smaller disc, the others counted.
-    strong = rest[growth[rest] * _REACHES[0] >= 1.0]
-    if len(strong) and dominant:
+    equations = {k: CharacteristicEquation(problems[k]) for k in rest}
+    for k, equation in equations.items():
+        checkpoint()
+        count = equation.count_outside()
+        out.outside[rows[k]] = -1 if count is None else count
+    # Much contact: multipliers far outside the circle are found on a smaller disc, and prove instability
+    # even where rounding hides the number of the others.
+    wanted = growth[rest] * _REACHES[0] >= 1.0
+    strong = rest[wanted & (dominant | (out.outside[rows[rest]] < 0))]
+    if len(strong):
         reach = np.minimum(_LARGEST_EXPONENT / growth[strong], 0.99)
-        series = ContactExpansion.of(motion[strong], centre[strong], reach)
-        found = leading_multipliers(series, ke[strong])
+        found = leading_multipliers(ContactExpansion.of(motion[strong], centre[strong], reach), ke[strong])
         far = found.resolved & (found.multiplier[:, 0] != 0)
         out.multiplier[rows[strong[far]]] = found.multiplier[far, 0]
         out.error_estimate[rows[strong[far]]] = found.error_estimate[far, 0]
-    for k in rest:
-        checkpoint()
-        equation = CharacteristicEquation(problems[k])
-        count = equation.count_outside()
-        out.outside[rows[k]] = -1 if count is None else count
-        if dominant and out.multiplier[rows[k]] == 0:
-            out.multiplier[rows[k]], out.error_estimate[rows[k]] = equation.dominant(count)
+    for k, equation in equations.items():
+        count = int(out.outside[rows[k]])
+        if (dominant or count < 0) and out.multiplier[rows[k]] == 0:
+            out.multiplier[rows[k]], out.error_estimate[rows[k]] = equation.dominant(
+                None if count < 0 else count
+            )

@@ -65,6 +65,12 @@ class Fourier:
     sine: tuple[float, ...]
     period: float
 
+    def __post_init__(self) -> None:
+        if len(self.sine) != len(self.cosine):
+            raise InvalidInput(
+                "sine", f"{len(self.sine)} numbers", f"give {len(self.cosine)}, as many as cosine"
+            )
+
     @property
     def _rates(self) -> np.ndarray:
         return 2 * np.pi / self.period * np.arange(1, len(self.cosine) + 1)

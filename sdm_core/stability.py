@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdm_core.arc_stability import batch_multipliers
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.delay_equation import DelayEquation
 from sdm_core.rubbing_blade import RubbingBlade
@@ -114,6 +115,10 @@ def _by_characteristic(problem: RubbingBlade) -> StabilitySolution:
     count = equation.count_outside()
     mu, error = equation.dominant(count)
     stable = None if count is None else count == 0
+    if count is None:  # too strong a contact to count: a multiplier far outside is proof enough
+        alone = batch_multipliers([problem])
+        if alone.stable[0] == 0.0:
+            mu, error, stable = complex(alone.multiplier[0]), float(alone.error_estimate[0]), False
     chatter = equation.chatter_hz(mu) if np.isfinite(error) else np.nan
     name = "exact characteristic equation, argument principle"
     return _solution(mu, error, stable, count, chatter, name, equation.evaluations)

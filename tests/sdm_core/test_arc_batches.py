@@ -17,6 +17,7 @@ from sdm_core.contact_expansion import ArcSeries, ContactExpansion
 from sdm_core.errors import Cancelled
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.stability import stability
 
 
 def random_arcs(rng: np.random.Generator) -> list[list[float]]:
@@ -85,8 +86,13 @@ def test_without_contact_the_least_damped_mode_dominates():
 def test_much_contact_is_proven_unstable_even_where_its_multipliers_are_not_counted():
     problem = random_problem(np.random.default_rng(5), [[0.0, 0.7]], kappa=0.3)
     slow = replace(problem, speed_hz=problem.speed_hz / 30).with_ke(3 * problem.ke)
+    assert CharacteristicEquation(slow).count_outside() is None
     found = batch_multipliers([slow])
     assert found.stable[0] == 0.0 and abs(found.multiplier[0]) > 1
+    assert batch_multipliers([slow], dominant=False).stable[0] == 0.0
+    alone = stability(slow)
+    assert alone.stable is False and alone.unstable_multipliers is None
+    assert alone.spectral_radius == pytest.approx(abs(found.multiplier[0]), rel=1e-9)
 
 
 @pytest.mark.parametrize("engaged", [0.3, 0.7])

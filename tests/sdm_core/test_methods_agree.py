@@ -1,6 +1,7 @@
 """Independent methods give the same answer; fast paths and their slow twins are held together."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,5 +136,7 @@ def test_no_crossing_lies_below_the_small_gain_bound(seed):
 def test_an_arc_boundary_with_an_undecided_verdict_is_not_proven(monkeypatch):
     contact = ContactConfiguration({"tip": 1.0}, ARCS["one arc"])
     monkeypatch.setattr(CharacteristicEquation, "count_outside", lambda self, radius=1.0: None)
+    undecided = SimpleNamespace(stable=np.array([np.nan]))
+    monkeypatch.setattr("sdm_core.arc_boundary.batch_multipliers", lambda *_, **__: undecided)
     found = boundary(benchmark_blade(), contact, np.array([0.23]), 1.0)
     assert np.isinf(found.error_estimate).all()
