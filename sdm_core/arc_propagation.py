@@ -18,33 +18,79 @@ _MOST_SQUARINGS = 60  # beyond, entries overflow long before
 
 
 def exponentials(a: np.ndarray) -> np.ndarray:
-    """exp(a) of many small matrices, shape (k, d, d): Taylor series, scaling and squaring.
+    """exp(a) of many small matrices, shape (k, d, d): Taylor series, scaling and squaring."""
+    return Exponentials.of(a).over(np.ones(len(a)))
+
+
+@dataclass(frozen=True)
+class Exponentials:
+    """exp(a x) of many small matrices a for several x each: powers of a serve all of them.
 
     Scaled motion is a rotation, so that squaring does not lose accuracy: rounding stays near
-    ε‖a‖. The series takes six products (Paterson and Stockmeyer 1973).
+    ε‖a x‖. Powers and series take six products (Paterson and Stockmeyer 1973).
+
+    Attributes
+    ----------
+    size
+        ‖a‖ (largest row sum), shape (k,).
+    powers
+        a/‖a‖ to the power 0 to 4, shape (5, k, d, d).
     """
-    size = np.abs(a).sum(axis=2).max(axis=1)
-    size = np.where(np.isfinite(size), size, np.inf)
-    with np.errstate(divide="ignore"):
-        squarings = np.ceil(np.log2(np.maximum(size / _LARGEST_NORM, 1e-300)))
-    squarings = np.clip(squarings, 0, _MOST_SQUARINGS).astype(int)
-    one = np.eye(a.shape[-1])
-    a = a * (0.5**squarings)[:, None, None]
-    a2 = a @ a
-    a3, a4 = a2 @ a, a2 @ a2
 
-    def block(j: int) -> np.ndarray:
-        return _TAYLOR[j] * one + _TAYLOR[j + 1] * a + _TAYLOR[j + 2] * a2 + _TAYLOR[j + 3] * a3
+    size: np.ndarray
+    powers: np.ndarray
 
-    out = block(12) + _TAYLOR[16] * a4
-    for j in (8, 4, 0):
-        out = block(j) + a4 @ out
-    for k in range(int(squarings.max(initial=0))):
-        go = squarings > k
-        if go.all():
-            out = out @ out
-        else:
-            out[go] = out[go] @ out[go]
+    @classmethod
+    def of(cls, a: np.ndarray) -> Exponentials:
+        size = np.abs(a).sum(axis=2).max(axis=1)
+        powers = np.empty((5, *a.shape), dtype=a.dtype)
+        powers[0] = np.eye(a.shape[-1])
+        np.multiply(a, (1 / np.where(size > 0, size, 1.0))[:, None, None], out=powers[1])
+        np.matmul(powers[1], powers[1], out=powers[2])
+        np.matmul(powers[2], powers[1], out=powers[3])
+        np.matmul(powers[2], powers[2], out=powers[4])
+        return cls(size, powers)
+
+    def over(self, x: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """exp(a x), x ≥ 0 of shape (k,), shape (k, d, d); or of some rows only."""
+        powers, size = self.powers, self.size * x
+        if rows is not None:
+            powers, size = powers[:, rows], size[rows]
+        _, k, d, _ = powers.shape
+        with np.errstate(divide="ignore", invalid="ignore"):
+            needed = np.ceil(np.log2(np.maximum(size / _LARGEST_NORM, 1e-300)))
+        squarings = np.clip(np.where(np.isnan(needed), 0, needed), 0, _MOST_SQUARINGS).astype(int)
+        # Four terms of the series at a time, in one product of real numbers.
+        scaled = _TAYLOR * (size * 0.5**squarings)[:, None] ** np.arange(_DEGREE + 1)
+        terms = np.zeros((k, 4, 5))
+        terms[:, :, :4] = scaled[:, :16].reshape(k, 4, 4)
+        terms[:, 3, 4] = scaled[:, 16]
+        entries = powers.reshape(5, k, d * d).view(float).swapaxes(0, 1)
+        blocks = np.ascontiguousarray((terms @ entries).swapaxes(0, 1)).view(powers.dtype)
+        blocks = blocks.reshape(4, k, d, d)
+        out = blocks[3]
+        for j in (2, 1, 0):
+            out = powers[4] @ out
+            out += blocks[j]
+        return _squared(out, squarings)
+
+
+def _squared(a: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Each matrix squared so many times."""
+    if len(a) == 0 or times.max() == 0:
+        return a
+    most = int(times.max())
+    if times.min() == most:
+        for _ in range(most):
+            a = a @ a
+        return a
+    order = np.argsort(-times, kind="stable")  # those still to be squared lie together
+    a = a[order]
+    left = len(a) - np.cumsum(np.bincount(times, minlength=most + 1))
+    for count in left[:most]:
+        a[:count] = a[:count] @ a[:count]
+    out = np.empty_like(a)
+    out[order] = a
     return out
 
 
@@ -123,7 +169,7 @@ class ArcPropagation:
 
     def fundamental(self, case: np.ndarray, c: np.ndarray) -> np.ndarray:
         """M(c) of problem `case` each, shape (k, 2n, 2n); c in N/m, shape (k,)."""
-        chunk = max(16, int(2000 * (4 / self.size) ** 2))
+        chunk = max(50, int(600 * (4 / self.size) ** 2))
         if len(case) > chunk:
             starts = range(0, len(case), chunk)
             return np.concatenate([self.fundamental(case[i : i + chunk], c[i : i + chunk]) for i in starts])
@@ -137,11 +183,20 @@ class ArcPropagation:
         rate[:, n:, :n] += c[:, None, None] * self.coupling[case]
         out: np.ndarray | None = None
         with np.errstate(all="ignore"):  # where c is huge entries overflow: callers look at the result
+            exponential = Exponentials.of(rate)
             for s in range(self.arcs.shape[1]):
-                step = exponentials(rate * self.arcs[case, s, None, None])
-                out = step if out is None else step @ out
-                if self.flights[case, s].any():
+                length = self.arcs[case, s]
+                has = np.flatnonzero(length > 0)  # some have fewer arcs than others
+                if out is None or len(has) == len(case):
+                    step = exponential.over(length)
+                    out = step if out is None else step @ out
+                elif len(has):
+                    out[has] = exponential.over(length, has) @ out[has]
+                fly = np.flatnonzero(self.flights[case, s] > 0)
+                if len(fly) == len(case):
                     out = self.flight(case, s) @ out
+                elif len(fly):
+                    out[fly] = self.flight(case[fly], s) @ out[fly]
         assert out is not None
         return out
 

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdm_core.arc_propagation import ArcPropagation
-from sdm_core.characteristic import CharacteristicEquation
+from sdm_core.characteristic import CharacteristicEquation, count_outside
 from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.fredholm import leading_multipliers
-from sdm_core.interruption import checkpoint
+from sdm_core.parallel import available_cores, in_threads
 from sdm_core.rubbing_blade import RubbingBlade
 
-_LARGEST_EXPONENT = 10.0  # of the growth on the rim: e^10 costs four digits
+_LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits
+_STRONG_EXPONENTS = (12.0, 15.0, 8.0, 5.0)  # tried in turn where the circle is out of reach
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
-_CHUNK = 500
+_CHUNK, _FEWEST = 250, 50  # problems solved together
 
 Progress = Callable[[int, int], None]
 
@@ -52,32 +53,48 @@ class BatchMultipliers:
 
 
 def batch_multipliers(
-    problems: Sequence[RubbingBlade], *, dominant: bool = True, progress: Progress | None = None
+    problems: Sequence[RubbingBlade],
+    *,
+    dominant: bool = True,
+    progress: Progress | None = None,
+    threads: int | None = None,
 ) -> BatchMultipliers:
     """Dominant multiplier and number of unstable ones of each problem.
 
-    Problems with equally many modes are solved together, at most `_CHUNK` at a time.
+    Problems with equally many modes are solved together, at most `_CHUNK` at a time: memory stays
+    bounded, and the work can be stopped between array operations (`interruption`).
 
     Parameters
     ----------
     dominant
         False where only the number of unstable ones is asked for: multipliers far inside the circle
         are then not looked for, and come back as zero.
+    progress
+        Called with problems solved and their number, in the calling thread.
+    threads
+        Threads to share the work; None takes all cores that this process may use.
     """
     b = len(problems)
     out = BatchMultipliers(
         np.zeros(b, dtype=complex), np.full(b, np.inf), np.full(b, -1), np.zeros(b, dtype=bool)
     )
     modes = np.array([len(p.omega) for p in problems])
-    finished = 0
+    threads = available_cores() if threads is None else threads
+    parts = []
     for n in np.unique(modes):
         members = np.flatnonzero(modes == n)
-        for i in range(0, len(members), _CHUNK):
-            rows = members[i : i + _CHUNK]
-            _solve([problems[k] for k in rows], rows, out, dominant)
-            finished += len(rows)
-            if progress is not None:
-                progress(finished, b)
+        size = min(_CHUNK, max(_FEWEST, -(-len(members) // threads)))
+        parts += [members[i : i + size] for i in range(0, len(members), size)]
+    finished = 0
+
+    def solve(rows: np.ndarray) -> int:
+        _solve([problems[k] for k in rows], rows, out, dominant)
+        return len(rows)
+
+    for solved in in_threads(solve, parts, threads):
+        finished += solved
+        if progress is not None:
+            progress(finished, b)
     return out
 
 
@@ -106,24 +123,25 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         out.by_series[at] = True
         todo = todo[~decided]
     rest = np.flatnonzero(~out.by_series[rows])
-    equations = {k: CharacteristicEquation(problems[k]) for k in rest}
-    for k, equation in equations.items():
-        checkpoint()
-        count = equation.count_outside()
-        out.outside[rows[k]] = -1 if count is None else count
+    if len(rest) == 0:
+        return
+    out.outside[rows[rest]] = count_outside(motion[rest], ke[rest])
     # Much contact: multipliers far outside the circle are found on a smaller disc, and prove instability
     # even where rounding hides the number of the others.
     wanted = growth[rest] * _REACHES[0] >= 1.0
     strong = rest[wanted & (dominant | (out.outside[rows[rest]] < 0))]
-    if len(strong):
-        reach = np.minimum(_LARGEST_EXPONENT / growth[strong], 0.99)
+    for exponent in _STRONG_EXPONENTS:
+        if len(strong) == 0:
+            break
+        reach = np.minimum(exponent / growth[strong], 0.99)
         found = leading_multipliers(ContactExpansion.of(motion[strong], centre[strong], reach), ke[strong])
         far = found.resolved & (found.multiplier[:, 0] != 0)
         out.multiplier[rows[strong[far]]] = found.multiplier[far, 0]
         out.error_estimate[rows[strong[far]]] = found.error_estimate[far, 0]
-    for k, equation in equations.items():
+        strong = strong[~far]
+    for k in rest:
         count = int(out.outside[rows[k]])
         if (dominant or count < 0) and out.multiplier[rows[k]] == 0:
-            out.multiplier[rows[k]], out.error_estimate[rows[k]] = equation.dominant(
-                None if count < 0 else count
-            )
+            out.multiplier[rows[k]], out.error_estimate[rows[k]] = CharacteristicEquation(
+                problems[k]
+            ).dominant(None if count < 0 else count)

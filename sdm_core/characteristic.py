@@ -7,15 +7,48 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sdm_core.arc_propagation import ArcPropagation
-from sdm_core.contact_expansion import ArcSeries
 from sdm_core.interruption import checkpoint
 from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.winding import half_turns
 
-_LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
-_MOST_POINTS = 60_000
-_FEW = 40  # points, for which building series does not pay
 _LARGEST_GROWTH = 1e11  # of an entry of M: what is smaller than its rounding error no longer shows
 _MOST_OSCILLATIONS = 200_000.0  # rad a revolution that the chatter frequency is looked for among
+
+
+def determinant(m: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    """det(I − M/μ), shape (k,); NaN where M grows so much that rounding would hide a multiplier."""
+    with np.errstate(all="ignore"):
+        m = np.where((np.abs(m).max(axis=(1, 2)) < _LARGEST_GROWTH)[:, None, None], m, np.nan)
+        return np.linalg.det(np.eye(m.shape[-1]) - m / mu[:, None, None])
+
+
+def first_points(motion: ArcPropagation, ke: np.ndarray, radius: float = 1.0) -> np.ndarray:
+    """Points of the half circle |μ| = `radius` to begin a count with, shape (b,).
+
+    Contact adds a phase of up to K_e |1/μ − 1| × `phase_shift` over a revolution; those of all
+    unstable multipliers together turn the determinant about as much.
+    """
+    return 17 + np.minimum(1000.0, motion.phase_shift * ke * (1 + 1 / radius)).astype(int)
+
+
+def count_outside(motion: ArcPropagation, ke: np.ndarray) -> np.ndarray:
+    """Multipliers outside the unit circle of each problem of a batch, shape (b,); −1 where not decided."""
+
+    def value(case: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        checkpoint()
+        mu = np.exp(1j * angle)
+        chunk = 4000
+        parts = [slice(i, i + chunk) for i in range(0, len(case), chunk)]
+        return np.concatenate(
+            [determinant(motion.fundamental(case[p], ke[case[p]] * (1 / mu[p] - 1)), mu[p]) for p in parts]
+        )
+
+    # Contact makes vibration grow most a quarter turn round the circle: what is hidden shows there first.
+    probe = value(np.arange(len(motion)), np.full(len(motion), 0.5 * np.pi))
+    points = np.where(np.isfinite(probe), first_points(motion, ke), 0)
+    turns, _ = half_turns(value, points)
+    count = -np.round(np.where(np.isnan(turns), 1.0, turns)).astype(int)
+    return np.where((count >= 0) & (np.abs(turns + count) < 1e-3), count, -1)
 
 
 @dataclass
@@ -39,7 +72,6 @@ class CharacteristicEquation:
 
     def __post_init__(self) -> None:
         self._motion = ArcPropagation.of([self.problem])
-        self._series: ArcSeries | None = None
 
     @property
     def size(self) -> int:
@@ -53,29 +85,14 @@ class CharacteristicEquation:
         with np.errstate(all="ignore"):  # near μ = 0, an essential singularity
             return self._motion.fundamental(np.zeros(len(mu), dtype=int), self.problem.ke * (1 / mu - 1))
 
-    def _fundamental_outside(self, mu: np.ndarray) -> np.ndarray:
-        """M(μ) for |μ| ≥ 1: by the series of each arc, several times faster."""
-        if len(mu) < _FEW and self._series is None:
-            return self.fundamental(mu)
-        if self._series is None:
-            self._series = ArcSeries.of(self._motion, self.problem.ke)
-        checkpoint()
-        self.evaluations += len(mu)
-        return self._series.fundamental(self.problem.ke * (1 / mu - 1))
-
     def value(self, mu: np.ndarray) -> np.ndarray:
         """det(I − M(μ)/μ), shape (m,); NaN where M grows so much that rounding would hide a multiplier."""
         mu = np.atleast_1d(np.asarray(mu, dtype=complex))
         out = np.empty(len(mu), dtype=complex)
         chunk = max(1, int(4000 * (10 / self.size) ** 3))
-        outside = bool(self.problem.ke > 0 and (np.abs(mu) >= 1).all())
         for i in range(0, len(mu), chunk):
             part = mu[i : i + chunk]
-            m = self._fundamental_outside(part) if outside else self.fundamental(part)
-            with np.errstate(all="ignore"):
-                largest = np.abs(m).max(axis=(1, 2))
-                m = np.where((largest < _LARGEST_GROWTH)[:, None, None], m, np.nan)
-                out[i : i + chunk] = np.linalg.det(np.eye(self.size) - m / part[:, None, None])
+            out[i : i + chunk] = determinant(self.fundamental(part), part)
         return out
 
     def _candidates(self, mu: np.ndarray) -> np.ndarray:
@@ -91,58 +108,24 @@ class CharacteristicEquation:
 
         det(μI − M(μ)) has 2n zeros' worth of growth at infinity and an essential singularity at 0,
         so zeros are counted from outside: their number is minus the winding number of
-        det(I − M(μ)/μ) round the circle. Conjugate symmetry leaves half of it. Points are added
-        until the phase turns by less than 0.8 rad between neighbours, then at every middle
-        once more, to see that no turn was hidden.
+        det(I − M(μ)/μ) round the circle. Conjugate symmetry leaves half of it.
         """
-        angle, value = self._on_circle(radius)
-        if angle is None or value is None:
-            return None
-        turns = np.angle(value[1:] / value[:-1]).sum() / np.pi
-        count = -round(turns)
-        return count if abs(turns + count) < 1e-3 and count >= 0 else None
+        turns, _ = self._on_circle(radius)
+        count = -round(turns) if np.isfinite(turns) else -1
+        return count if count >= 0 and abs(turns + count) < 1e-3 else None
 
     def crossing_near(self, radius: float = 1.0) -> complex:
         """Point of the circle nearest to a multiplier, as the determinant shows it."""
-        angle, value = self._on_circle(radius)
-        if angle is None or value is None:
-            angle = np.linspace(0.0, np.pi, 4 * self._first_points(radius))
-            value = self.value(radius * np.exp(1j * angle))
-        size = np.where(np.isfinite(value), np.abs(value), np.inf)
-        return complex(radius * np.exp(1j * angle[np.argmin(size)]))
+        return complex(radius * np.exp(1j * self._on_circle(radius)[1]))
 
-    def _on_circle(self, radius: float) -> tuple[np.ndarray | None, np.ndarray | None]:
-        angle = np.linspace(0.0, np.pi, self._first_points(radius))
-        value = self.value(radius * np.exp(1j * angle))
-        checked = np.zeros(len(angle) - 1, dtype=bool)
-        while True:
-            if not np.isfinite(value).all() or (value == 0).any():
-                return None, None
-            step = np.abs(np.angle(value[1:] / value[:-1]))
-            coarse = np.flatnonzero((step > _LARGEST_STEP) | ~checked)
-            if len(coarse) == 0:
-                return angle, value
-            if len(angle) + len(coarse) > _MOST_POINTS:
-                return None, None
-            if (angle[coarse + 1] - angle[coarse]).min() < 1e-13:
-                return None, None
-            middle = 0.5 * (angle[coarse] + angle[coarse + 1])
-            new = self.value(radius * np.exp(1j * middle))
-            if not np.isfinite(new).all() or (new == 0).any():
-                return None, None
-            hidden = np.angle(new / value[coarse]) + np.angle(value[coarse + 1] / new)
-            hidden -= np.angle(value[coarse + 1] / value[coarse])
-            fine = (np.abs(hidden) < 1.0) & (step[coarse] <= _LARGEST_STEP)
-            checked[coarse] = fine
-            checked = np.insert(checked, coarse + 1, fine)
-            angle = np.insert(angle, coarse + 1, middle)
-            value = np.insert(value, coarse + 1, new)
+    def _on_circle(self, radius: float) -> tuple[float, float]:
+        turns, nearest = half_turns(
+            lambda _, angle: self.value(radius * np.exp(1j * angle)), np.array([self._first_points(radius)])
+        )
+        return float(turns[0]), float(nearest[0])
 
     def _first_points(self, radius: float) -> int:
-        # Contact shifts the phase of mode j over a revolution by about K_e G_jj τ |1/μ − 1|/(2ω_j).
-        p = self.problem
-        shift = p.ke * p.contact_matrix.diagonal() / (2 * p.omega) * p.tau * (1 + 1 / radius)
-        return 33 + int(min(2000.0, 4 * shift.sum()))
+        return int(first_points(self._motion, np.array([self.problem.ke]), radius)[0])
 
     def dominant(self, unstable: int | None = None) -> tuple[complex, float]:
         """Multiplier of largest modulus (upper half-plane) and the relative error of its modulus.

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 
 from sdm_core.arc_propagation import ArcPropagation
 
-_TERMS = (8, 12, 16, 24, 32, 48, 64, 96, 128)
-FEWEST_TERMS, MOST_TERMS = _TERMS[0], _TERMS[-1]
+_TERMS = np.array([6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
+FEWEST_TERMS, MOST_TERMS = int(_TERMS[0]), int(_TERMS[-1])
+# Phase shift on the rim up to which so many terms suffice, two of them negligible: sᵏ/k! < 3e-15.
+_SHIFT_HELD = np.array([(3e-15 * factorial(m - 2)) ** (1 / (m - 2)) for m in _TERMS])
 _NEGLIGIBLE = 3e-15  # size of the last terms, relative to the largest entry on the disc
 
 
@@ -61,21 +65,19 @@ class ContactExpansion:
         shift = motion.phase_shift * radius
         noise = np.finfo(float).eps * (1 + motion.angle.max(axis=1))
         todo = np.arange(count)
-        for m in _TERMS:
-            # e^{s t} needs about e s + 8 terms: those that cannot do with m wait for the next round.
-            now = todo[(2.7 * shift[todo] + 4 <= m) | (m == MOST_TERMS)]
-            if len(now) == 0:
-                continue
-            found, largest = _series(motion, now, centre, radius, m)
-            tail = np.abs(found[:, -max(2, m // 8) :]).max(axis=(1, 2, 3))
-            done = (tail <= np.maximum(_NEGLIGIBLE, 2 * noise[now]) * largest) & np.isfinite(largest)
-            if m > coefficients.shape[1]:
-                grown = np.zeros((count, m, d, d))
-                grown[:, : coefficients.shape[1]] = coefficients
-                coefficients = grown
-            coefficients[now[done], :m] = found[done]
-            size[now], resolved[now[done]] = largest, True
-            todo = np.setdiff1d(todo, now[done])
+        level = np.minimum(np.searchsorted(_SHIFT_HELD, shift), len(_TERMS) - 1)
+        while len(todo):
+            for now, m, found, largest in _series(motion, todo, centre, radius, _TERMS[level[todo]]):
+                tail = np.abs(found[:, -max(2, m // 8) :]).max(axis=(1, 2, 3))
+                done = (tail <= np.maximum(_NEGLIGIBLE, 2 * noise[now]) * largest) & np.isfinite(largest)
+                if m > coefficients.shape[1]:
+                    grown = np.zeros((count, m, d, d))
+                    grown[:, : coefficients.shape[1]] = coefficients
+                    coefficients = grown
+                coefficients[now[done], :m] = found[done]
+                size[now], resolved[now[done]] = largest, True
+            level[todo] += 1
+            todo = todo[~resolved[todo] & (level[todo] < len(_TERMS))]
         return cls(centre, radius, coefficients, size, noise, resolved)
 
     def __getitem__(self, rows: np.ndarray) -> ContactExpansion:
@@ -118,73 +120,22 @@ class ContactExpansion:
 
 
 def _series(
-    motion: ArcPropagation, rows: np.ndarray, centre: np.ndarray, radius: np.ndarray, terms: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients (k, terms, d, d), and the largest entry on the rim (k,)."""
-    half = terms // 2 + 1
-    t = np.exp(2j * np.pi * np.arange(half) / terms)
-    c = radius[rows, None] * t - centre[rows, None]
-    values = motion.fundamental(np.repeat(rows, half), c.ravel()).reshape(
-        len(rows), half, motion.size, motion.size
-    )
-    with np.errstate(all="ignore"):
-        largest = np.abs(values).max(axis=(1, 2, 3))
-        return np.fft.irfft(values.conj(), terms, axis=1), np.where(np.isfinite(largest), largest, np.inf)
+    motion: ArcPropagation, rows: np.ndarray, centre: np.ndarray, radius: np.ndarray, terms: np.ndarray
+) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
+    """Rows with equally many terms: coefficients (k, terms, d, d), largest entry on the rim (k,).
 
-
-@dataclass(frozen=True)
-class ArcSeries:
-    """M(c) of one problem where it grows too much over the disc for one series to hold its digits.
-
-    Each arc is cut in 2^k equal parts, over which the contact shifts the phase by less than a
-    radian: their exponentials have short series without cancellation, and k squarings give the arc.
-
-    Attributes
-    ----------
-    motion
-        A batch of one.
-    centre
-        K; the series hold in |c + K| ≤ K, the image of |μ| ≥ 1; N/m.
-    parts
-        Series of one part of each arc, shape (arcs, terms, d, d).
-    squarings
-        k of each arc, shape (arcs,).
+    The samples of all rows are taken at once: small groups would cost as much as large ones.
     """
-
-    motion: ArcPropagation
-    centre: float
-    parts: np.ndarray
-    squarings: np.ndarray
-
-    @classmethod
-    def of(cls, motion: ArcPropagation, ke: float) -> ArcSeries:
-        arcs = motion.arcs[0]
-        shift = 0.5 * np.trace(motion.coupling[0]) * arcs * ke
-        squarings = np.maximum(0, np.ceil(np.log2(np.maximum(shift, 1e-300)))).astype(int)
-        every = np.zeros(len(arcs), dtype=int)
-        part = replace(motion[every], arcs=(arcs * 0.5**squarings)[:, None], flights=np.zeros((len(arcs), 1)))
-        for terms in (12, 24, 48, 96):
-            parts, largest = _series(
-                part, np.arange(len(arcs)), np.full(len(arcs), ke), np.full(len(arcs), ke), terms
-            )
-            if (np.abs(parts[:, -2:]).max(axis=(1, 2, 3)) <= 1e-14 * largest).all():
-                break
-        return cls(motion, ke, parts, squarings)
-
-    def fundamental(self, c: np.ndarray) -> np.ndarray:
-        """M(c), shape (k, d, d), for c of shape (k,) inside the disc."""
-        t = (c + self.centre) / self.centre
-        powers = t[:, None] ** np.arange(self.parts.shape[1])
-        case = np.zeros(len(c), dtype=int)
-        d = self.motion.size
-        out: np.ndarray | None = None
+    half = terms // 2 + 1
+    start = np.cumsum(half) - half
+    case = np.repeat(np.arange(len(rows)), half)
+    turn = 2 * np.pi * (np.arange(len(case)) - start[case]) / terms[case]
+    c = radius[rows[case]] * np.exp(1j * turn) - centre[rows[case]]
+    values = motion.fundamental(rows[case], c)
+    for m in np.unique(terms):
+        members = np.flatnonzero(terms == m)
+        own = values[start[members, None] + np.arange(m // 2 + 1)]
         with np.errstate(all="ignore"):
-            for s, (series, squarings) in enumerate(zip(self.parts, self.squarings, strict=True)):
-                step = ContactExpansion._sum(powers[None], series[None])[0]
-                for _ in range(squarings):
-                    step = step @ step
-                out = step if out is None else step @ out
-                if self.motion.flights[0, s] > 0:
-                    out = self.motion.flight(case, s) @ out
-        assert out is not None
-        return out.reshape(len(c), d, d)
+            largest = np.abs(own).max(axis=(1, 2, 3))
+            found = np.fft.irfft(own.conj(), m, axis=1)
+        yield rows[members], int(m), found, np.where(np.isfinite(largest), largest, np.inf)

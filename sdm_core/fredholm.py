@@ -11,7 +11,10 @@ from sdm_core.interruption import checkpoint
 
 _SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)
 _NEGLIGIBLE = 1e-13
-_NEAR_ONE = 1e-5  # of |ln |μ||: multipliers so near the circle are polished before they are counted
+_ENOUGH = 1e-11  # of the series: what its zeros are found from, before Newton's method
+_ORIGIN = 1e-3
+_UNPOLISHED = 1e-5  # relative error of those zeros, also of double ones
+_NEAR_ONE = 1e-3  # of |ln |μ||: multipliers so near the circle are polished before they are counted
 _EPS = np.finfo(float).eps
 
 
@@ -60,7 +63,7 @@ def leading_multipliers(
     series, resolved = _series(expansion, ke, reach)
     mu, counted = _zeros(series, reach)
     resolved &= counted & expansion.resolved
-    error = np.where(mu != 0, 1e-8, 0.0)
+    error = np.where(mu != 0, _UNPOLISHED, 0.0)
     modulus = np.abs(mu)
     with np.errstate(divide="ignore"):
         near = np.abs(np.log(np.where(modulus > 0, modulus, 1e-300))) < _NEAR_ONE
@@ -92,7 +95,7 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
         half = samples // 2 + 1
         found = np.empty((len(todo), samples))
         size = np.empty(len(todo))
-        chunk = max(1, int(3e5 / (half * d * d)))
+        chunk = max(1, int(6e4 / (half * d * d)))
         for i in range(0, len(todo), chunk):
             checkpoint()
             rows = todo[i : i + chunk]
@@ -105,9 +108,11 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
         done = tail <= np.maximum(_NEGLIGIBLE, 30 * expansion.noise[todo]) * size
         if samples > out.shape[1]:
             out = np.pad(out, ((0, 0), (0, samples - out.shape[1])))
+        done &= np.abs(found[:, 0] - 1) < _ORIGIN  # q(0) = 1, unless lost in rounding
         out[todo[done], :samples] = found[done]
         resolved[todo[done]] = True
         todo = todo[~done]
+    out[~resolved, 0] = 1.0
     return out, resolved
 
 
@@ -115,10 +120,10 @@ def _zeros(series: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Multipliers of the upper half-plane with |μ| > 1/R, shape (b, l), and whether their number is right."""
     b = len(series)
     largest = np.maximum(np.abs(series).max(axis=1), 1e-300)
-    kept = np.abs(series) > 1e-15 * largest[:, None]
+    kept = np.abs(series) > _ENOUGH * largest[:, None]
     degree = series.shape[1] - 1 - np.argmax(kept[:, ::-1], axis=1)
-    roots = np.zeros((b, int(degree.max(initial=1))), dtype=complex)
-    padded = 4 * ((degree + 3) // 4)
+    roots = np.zeros((b, int(degree.max(initial=2))), dtype=complex)
+    padded = 2 * ((degree + 1) // 2)
     for d in np.unique(padded[degree > 0]):
         rows = np.flatnonzero((padded == d) & (degree > 0))
         coefficients = series[rows, 1 : d + 1]

@@ -10,10 +10,10 @@ from scipy.linalg import expm
 from sdm_core.arc_propagation import ArcPropagation, exponentials
 from sdm_core.arc_stability import batch_multipliers
 from sdm_core.boundary import verdicts
-from sdm_core.characteristic import CharacteristicEquation
+from sdm_core.characteristic import CharacteristicEquation, count_outside, determinant
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
-from sdm_core.contact_expansion import ArcSeries, ContactExpansion
+from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.errors import Cancelled
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
@@ -62,7 +62,7 @@ def test_a_batch_gives_what_each_point_gives_alone():
         assert np.isinf(error) or abs(together.multiplier[i]) == pytest.approx(abs(mu), rel=1e-9)
 
 
-def test_both_series_give_the_fundamental_matrix_of_the_exponentials():
+def test_the_series_gives_the_fundamental_matrix_of_the_exponentials():
     for problem in random_problems(3, 12):
         motion = ArcPropagation.of([problem])
         c = problem.ke * (np.exp(-1j * np.linspace(0, np.pi, 9)) - 1)
@@ -70,9 +70,6 @@ def test_both_series_give_the_fundamental_matrix_of_the_exponentials():
         series = ContactExpansion.of(motion, np.array([problem.ke]), np.array([1.2]))
         assert series.resolved.all()
         np.testing.assert_allclose(series.fundamental(c[None])[0], exact, atol=1e-12 * series.size[0])
-        np.testing.assert_allclose(
-            ArcSeries.of(motion, problem.ke).fundamental(c), exact, atol=1e-12 * series.size[0]
-        )
 
 
 def test_without_contact_the_least_damped_mode_dominates():
@@ -119,3 +116,46 @@ def test_points_without_contact_among_others_are_answered():
     blade, contact = benchmark_blade(), ContactConfiguration({"tip": 1.0}, [(0.0, 0.25), (0.5, 0.75)])
     speed = np.linspace(0.02, 0.45, 200)
     assert (verdicts(blade, contact, speed, np.zeros(200)) == 1.0).all()
+
+
+def test_strong_contact_is_counted_in_batches_as_one_by_one_with_a_finer_start():
+    found = 0
+    for problem in random_problems(11, 60):
+        motion = ArcPropagation.of([problem])
+        growth = float(motion.phase_shift[0] * problem.ke)
+        strong = problem.with_ke(problem.ke * 12.0 / growth)  # much contact, still within reach of a count
+        motion = ArcPropagation.of([strong])
+
+        def value(_, angle, motion=motion, ke=strong.ke):
+            mu = np.exp(1j * angle)
+            return determinant(motion.fundamental(np.zeros(len(mu), dtype=int), ke * (1 / mu - 1)), mu)
+
+        fine = value(None, np.linspace(0, np.pi, 20_001))
+        count = -round(np.angle(fine[1:] / fine[:-1]).sum() / np.pi)
+        assert count_outside(motion, np.array([strong.ke]))[0] == count
+        found = max(found, count)
+    assert found > 6
+
+
+def test_threads_share_a_batch_and_give_the_same_answers():
+    problems = random_problems(12, 120)
+    alone, shared = batch_multipliers(problems, threads=1), batch_multipliers(problems, threads=3)
+    np.testing.assert_array_equal(alone.outside, shared.outside)
+    np.testing.assert_allclose(np.abs(alone.multiplier), np.abs(shared.multiplier), rtol=1e-12)
+
+
+def test_a_batch_in_threads_stops_when_asked_and_tells_how_far_it_is():
+    problems = random_problems(13, 200)
+    seen = []
+    batch_multipliers(problems, threads=2, progress=lambda done, of: seen.append((done, of)))
+    assert seen[-1] == (200, 200) and [d for d, _ in seen] == sorted(d for d, _ in seen)
+
+    calls = []
+
+    def stop():
+        calls.append(1)
+        if len(calls) > 5:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled), interruptible(stop):
+        batch_multipliers(problems, threads=2)
