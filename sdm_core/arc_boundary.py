@@ -1,16 +1,37 @@
-"""Stability boundary with arcs of contact: a scan of K_e, proven counts, Newton on (arg μ, K_e)."""
+"""Stability boundaries with arcs of contact: multipliers followed over K_e, crossings by Newton's method."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
+from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.arc_stability import batch_multipliers
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import Crossings
+from sdm_core.contact_expansion import ContactExpansion
+from sdm_core.fredholm import leading_multipliers, slopes
+from sdm_core.interruption import checkpoint
+from sdm_core.parallel import available_cores, in_threads
 from sdm_core.rubbing_blade import RubbingBlade
 
-SCAN_RATIO = 1.06  # between neighbouring stiffnesses: an island narrower than this can be missed
-_BRACKET = 1e-3
+_WIDEST = 0.12  # of ln K_e between neighbouring samples
+_GREATEST_GROWTH = 0.1  # of the contact's growth a revolution between them, so that no branch is overtaken
+NARROWEST_ISLAND = 1e-3  # of ln K_e: what happens within less may be missed
+_BRACKET = 1e-8  # of ln K_e, where Newton's method finds nothing
+_BESIDE = 1e-6  # of ln K_e: samples on both sides of a crossing
+_REACH = 1.3
+_SERIES_HOLD = 14.0 / _REACH  # growth a revolution up to which series count multipliers
+_BAND = 4.0  # K_e over which one series serves, where contact is strong
+_WEAK = 1.0  # growth up to which one series serves down to zero
+_FOLLOWED = 0.4  # of |ln |μ||: branches that may reach the circle between two samples
+_MOST_ROUNDS = 60
+_POINTS, _SPEEDS = 800, 50  # solved together
+_STRONG_RATIO = 1.06  # between neighbouring stiffnesses beyond the series
+
+Progress = Callable[[int, int], None]
 
 
 def least_destabilising_ke(problem: RubbingBlade) -> float:
@@ -28,94 +49,377 @@ def least_destabilising_ke(problem: RubbingBlade) -> float:
 
 
 def arc_crossings(problem: RubbingBlade, ke_max: float) -> Crossings:
-    """K_e up to `ke_max` at which the blade becomes unstable or stable again, at one speed.
+    """`boundaries_with_arcs` at one speed."""
+    return boundaries_with_arcs([problem], ke_max)[0]
 
-    The verdict is proven by the argument principle at stiffnesses `SCAN_RATIO` apart from the
-    small-gain bound up; each change is bracketed and then solved to rounding. Where one of those
-    verdicts cannot be decided the crossings are not `proven`.
+
+def boundaries_with_arcs(
+    problems: Sequence[RubbingBlade],
+    ke_max: float,
+    *,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> list[Crossings]:
+    """K_e up to `ke_max` at which each blade becomes unstable or stable again.
+
+    From the small-gain bound up the leading multipliers and their derivatives are known at samples
+    of K_e, their number outside the circle by the argument principle. Between two samples the
+    tangents tell whether a branch may cross the circle and come back: then the interval is
+    halved, down to `NARROWEST_ISLAND`. Each change of the verdict is solved for arg μ and K_e together.
+    Where a sample cannot be decided the crossings are not `proven`.
+
+    Parameters
+    ----------
+    problems
+        Each its own speed; their K_e is not used.
+    ke_max
+        N/m.
     """
-    low = least_destabilising_ke(problem)
-    if low >= ke_max:
-        return Crossings(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
-    low = max(low, 1e-9 * ke_max)
-    grid = np.geomspace(low, ke_max, 2 + int(np.log(ke_max / low) / np.log(SCAN_RATIO)))
-    verdicts = [_verdict(problem, ke) for ke in grid]
-    unstable = [verdict is not False for verdict in verdicts]  # not decided is never called stable
-    found = []
-    for i in range(len(unstable) - 1):
-        if unstable[i] != unstable[i + 1]:
-            found.append(_between(problem, grid[i], grid[i + 1], unstable[i + 1]))
-    ke, frequency, direction, error = np.array(found).reshape(-1, 4).T
-    return Crossings(ke, frequency, direction, error, proven=None not in verdicts)
+    out: list[Crossings] = [Crossings.none()] * len(problems)
+    modes = np.array([len(p.omega) for p in problems])
+    threads = available_cores() if threads is None else threads
+    parts = []
+    for n in np.unique(modes):
+        rows = np.flatnonzero(modes == n)
+        size = min(_SPEEDS, max(4, -(-len(rows) // threads)))
+        parts += [rows[i : i + size] for i in range(0, len(rows), size)]
+
+    def solve(rows: np.ndarray) -> int:
+        for row, crossings in zip(rows, _Scan([problems[i] for i in rows], ke_max).crossings(), strict=True):
+            out[row] = crossings
+        return len(rows)
+
+    finished = 0
+    for solved in in_threads(solve, parts, threads):
+        finished += solved
+        if progress is not None:
+            progress(finished, len(problems))
+    return out
 
 
-def _verdict(problem: RubbingBlade, ke: float) -> bool | None:
-    """True where the blade is unstable; None where neither K_e nor its neighbours can be decided."""
-    for nudge in (0.0, 1e-7, -1e-7, 1e-5):
-        count = CharacteristicEquation(problem.with_ke(ke * (1 + nudge))).count_outside()
-        if count is not None:
-            return count > 0
-    # So strong a contact that multipliers cannot be counted: one far outside is proof enough.
-    stable = batch_multipliers([problem.with_ke(ke)], dominant=False).stable[0]
-    return None if np.isnan(stable) else bool(stable == 0.0)
+@dataclass
+class _Samples:
+    """What is known at some K_e of some cases, by case and K_e.
+
+    Attributes
+    ----------
+    case, x
+        Speed and ln K_e.
+    outside
+        Multipliers outside the circle, −1 where not decided; 1 stands for one or more where
+        `followed` is false.
+    growth, slope, angle, turn
+        ln |μ| and arg μ of branches near the circle and their derivatives to ln K_e, shape (s, l);
+        growth −inf where there is none.
+    followed
+        False where contact is too strong for series.
+    solved
+        True where a crossing lies between this sample and the next.
+    """
+
+    case: np.ndarray
+    x: np.ndarray
+    outside: np.ndarray
+    growth: np.ndarray
+    slope: np.ndarray
+    angle: np.ndarray
+    turn: np.ndarray
+    followed: np.ndarray
+    solved: np.ndarray
+
+    def merged(self, other: _Samples) -> _Samples:
+        wide = max(self.growth.shape[1], other.growth.shape[1])
+        order = np.lexsort((np.r_[self.x, other.x], np.r_[self.case, other.case]))
+
+        def both(name: str) -> np.ndarray:
+            a, b = getattr(self, name), getattr(other, name)
+            if a.ndim == 2:
+                empty = -np.inf if name == "growth" else 0.0
+                a, b = (np.pad(v, ((0, 0), (0, wide - v.shape[1])), constant_values=empty) for v in (a, b))
+            return np.concatenate([a, b])[order]
+
+        return _Samples(*(both(name) for name in self.__dataclass_fields__))
 
 
-def _unstable(problem: RubbingBlade, ke: float) -> bool:
-    return _verdict(problem, ke) is not False
+@dataclass
+class _Crossing:
+    case: int
+    x: float
+    mu: complex
+    direction: float
+    error: float
 
 
-def _between(
-    problem: RubbingBlade, low: float, high: float, destabilising: bool
-) -> tuple[float, float, float, float]:
-    direction = 1.0 if destabilising else -1.0
-    while high / low - 1 > _BRACKET:
-        middle = np.sqrt(low * high)
-        if _unstable(problem, middle) == destabilising:
-            high = middle
-        else:
-            low = middle
-    ke, mu, error = _solved(problem, low, high)
-    while error == np.inf and high / low - 1 > 1e-7:
-        middle = np.sqrt(low * high)
-        if _unstable(problem, middle) == destabilising:
-            high = middle
-        else:
-            low = middle
-    if error == np.inf:
-        ke = np.sqrt(low * high)
-        equation = CharacteristicEquation(problem.with_ke(ke))
-        mu, error = equation.crossing_near(), high / low - 1
-    frequency = CharacteristicEquation(problem.with_ke(ke)).chatter_hz(mu)
-    return ke, frequency, direction, error
+class _Scan:
+    """All speeds of blades with equally many modes, up to one K_e."""
+
+    def __init__(self, problems: list[RubbingBlade], ke_max: float) -> None:
+        self.problems = problems
+        self.top = float(np.log(ke_max))
+        self.motion = ArcPropagation.of(problems)
+        self.shift = self.motion.phase_shift
+        low = np.array([least_destabilising_ke(p) for p in problems])
+        self.open = np.flatnonzero(low < ke_max)
+        self.bottom = np.log(np.maximum(np.where(np.isfinite(low), low, ke_max), 1e-9 * ke_max))
+        self._series_of_bands(ke_max)
+        self.found: list[_Crossing] = []
+        self.undecided: set[int] = set()
+
+    def _series_of_bands(self, ke_max: float) -> None:
+        case, centre, start = [], [], [0]
+        for i in range(len(self.problems)):
+            hold = min(ke_max, _SERIES_HOLD / max(self.shift[i], 1e-300))
+            tops = [hold]
+            while tops[-1] * self.shift[i] > _WEAK:
+                tops.append(tops[-1] / _BAND)
+            case += [i] * len(tops)
+            centre += tops[::-1]
+            start.append(len(case))
+        self.band_case, self.band_top, self.band_start = np.array(case), np.array(centre), np.array(start)
+        slowest = np.exp((self.motion.damping_ratio * self.motion.angle).min(axis=1))[self.band_case]
+        growth = self.band_top * self.shift[self.band_case]
+        with np.errstate(divide="ignore"):
+            reach = np.clip(14.0 / growth, _REACH, _REACH * slowest)
+        self.series = ContactExpansion.of(
+            self.motion[self.band_case], self.band_top, np.maximum(reach, _REACH)
+        )
+
+    def crossings(self) -> list[Crossings]:
+        """Of every case, in order."""
+        case, x = self._grid()
+        samples = self._sampled(case, x)
+        for _ in range(_MOST_ROUNDS):
+            checkpoint()
+            case, x, solved = self._wanted(samples)
+            if len(case) == 0:
+                break
+            new = self._sampled(case, x)
+            new.solved = solved
+            samples = samples.merged(new)
+        out = [Crossings.none()] * len(self.problems)
+        for i in self.open:
+            out[i] = self._collected(int(i))
+        return out
+
+    def _grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Samples to begin with."""
+        case, x = [], []
+        for i in self.open:
+            ke, at = float(np.exp(self.bottom[i])), []
+            top = float(np.exp(self.top))
+            while ke < top:
+                at.append(ke)
+                step = min(ke * np.expm1(_WIDEST), _GREATEST_GROWTH / max(self.shift[i], 1e-300))
+                ke += step if ke * self.shift[i] < _SERIES_HOLD else ke * (_STRONG_RATIO - 1)
+            at.append(top)
+            case += [i] * len(at)
+            x += list(np.log(at))
+        return np.array(case, dtype=int), np.array(x)
+
+    def _sampled(self, case: np.ndarray, x: np.ndarray) -> _Samples:
+        parts = [self._sample(case[i : i + _POINTS], x[i : i + _POINTS]) for i in range(0, len(x), _POINTS)]
+        out = parts[0] if parts else self._sample(case, x)
+        for part in parts[1:]:
+            out = out.merged(part)
+        return out
+
+    def _sample(self, case: np.ndarray, x: np.ndarray) -> _Samples:
+        checkpoint()
+        ke = np.exp(x)
+        outside = np.full(len(x), -1)
+        band = self._band(case, ke)
+        followed = band >= 0
+        rows = np.flatnonzero(followed)
+        width = 1
+        growth = slope = angle = turn = np.zeros((len(x), 1))
+        if len(rows):
+            own = self.series[band[rows]]
+            found = leading_multipliers(own, ke[rows])
+            followed[rows[~found.resolved]] = False
+            outside[rows] = found.outside
+            mu = found.multiplier
+            with np.errstate(divide="ignore"):
+                level = np.log(np.abs(mu))
+            near = (np.abs(level) < _FOLLOWED) | ((np.arange(mu.shape[1]) == 0) & (level > 0))
+            width = mu.shape[1]
+            growth = np.full((len(x), width), -np.inf)
+            slope, angle, turn = (np.zeros((len(x), width)) for _ in range(3))
+            at, column = np.nonzero(near)
+            if len(at):
+                _, change, _ = slopes(own[at], ke[rows[at]], mu[at, column])
+                good = np.isfinite(change)
+                at, column, change = at[good], column[good], change[good]
+                growth[rows[at], column] = level[at, column]
+                angle[rows[at], column] = np.angle(mu[at, column])
+                slope[rows[at], column], turn[rows[at], column] = change.real, change.imag
+        strong = np.flatnonzero((outside < 0) & ~followed)
+        if len(strong):
+            problems = [self.problems[case[k]].with_ke(float(ke[k])) for k in strong]
+            stable = batch_multipliers(problems, dominant=False, threads=1).stable
+            outside[strong] = np.where(np.isnan(stable), -1, stable == 0.0)
+        for k in np.flatnonzero((outside < 0) & followed):  # on the circle to rounding: a neighbour tells
+            alone = CharacteristicEquation(self.problems[case[k]].with_ke(float(ke[k]) * (1 + 1e-7)))
+            count = alone.count_outside()
+            outside[k] = -1 if count is None else count
+        self.undecided.update(int(i) for i in case[outside < 0])
+        none = np.zeros(len(x), dtype=bool)
+        out = _Samples(case, x, outside, growth, slope, angle, turn, followed, none)
+        return out.merged(_Samples(*(getattr(out, f)[:0] for f in out.__dataclass_fields__)))
+
+    def _band(self, case: np.ndarray, ke: np.ndarray) -> np.ndarray:
+        """Row of the series that serves each point, −1 where contact is too strong."""
+        # Complex numbers sort by real part, then imaginary part: by case, then by K_e.
+        table = self.band_case + 1j * self.band_top * (1 + 1e-12)
+        row = np.searchsorted(table, case + 1j * ke)
+        held = row < self.band_start[case + 1]
+        row = np.where(held, row, 0)
+        return np.where(held & self.series.resolved[row], row, -1)
+
+    def _wanted(self, s: _Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Next samples, by case and K_e: middles of intervals, and both sides of new crossings."""
+        inner = (s.case[1:] == s.case[:-1]) & ~s.solved[:-1]
+        width = np.where(inner, np.diff(s.x), 0.0)
+        stable = s.outside == 0
+        changes = inner & (stable[1:] != stable[:-1])
+        followed = s.followed[1:] & s.followed[:-1] & inner & (width > NARROWEST_ISLAND)
+        split = followed & ~changes & _may_cross(s, width, stable)
+        case, x, solved = [], [], []
+        for i in np.flatnonzero(changes):
+            crossing = self._solved(s, int(i))
+            if crossing is None and width[i] > _BRACKET:
+                split[i] = True
+                continue
+            if crossing is None:
+                middle = 0.5 * (s.x[i] + s.x[i + 1])
+                equation = CharacteristicEquation(self.problems[s.case[i]].with_ke(float(np.exp(middle))))
+                direction = 1.0 if stable[i] else -1.0
+                crossing = _Crossing(
+                    int(s.case[i]), middle, equation.crossing_near(), direction, float(width[i])
+                )
+                s.solved[i] = True
+            else:
+                gap = max(10 * crossing.error, _BESIDE)
+                sides = [crossing.x - gap, crossing.x + gap]
+                inside = [side for side in sides if s.x[i] < side < s.x[i + 1]]
+                case += [crossing.case] * len(inside)
+                x += inside
+                if inside and inside[0] == sides[0]:
+                    solved += [True, False][: len(inside)]
+                else:  # the sample before lies as near as that
+                    s.solved[i] = True
+                    solved += [False] * len(inside)
+            self.found.append(crossing)
+        at = np.flatnonzero(split)
+        case += list(s.case[at])
+        x += list(0.5 * (s.x[at] + s.x[at + 1]))
+        solved += [False] * len(at)
+        order = np.lexsort((x, case))
+        return np.array(case, dtype=int)[order], np.array(x)[order], np.array(solved, dtype=bool)[order]
+
+    def _solved(self, s: _Samples, i: int) -> _Crossing | None:
+        """The crossing between samples i and i + 1, by Newton's method from the unstable side."""
+        from_above = s.outside[i] == 0
+        side = i + 1 if from_above else i
+        out = np.flatnonzero(s.growth[side] > 0)
+        if s.outside[side] not in (1, 2) or len(out) != 1:
+            return None
+        j = out[0]
+        growth, slope = s.growth[side, j], s.slope[side, j]
+        if slope == 0:
+            return None
+        move = -growth / slope
+        x, angle = s.x[side] + move, s.angle[side, j] + s.turn[side, j] * move
+        real = s.angle[side, j] in (0.0, np.pi)
+        angle = s.angle[side, j] if real else angle
+        change = np.inf
+        noise = np.array([0.0])
+        for _ in range(12):
+            if not s.x[i] - 1e-9 <= x <= s.x[i + 1] + 1e-9:
+                return None
+            row = self._band(s.case[i : i + 1], np.exp(np.array([x])))
+            if row[0] < 0:
+                return None
+            mu = np.exp(1j * np.array([angle]))
+            residual, by_x, noise = slopes(self.series[row], np.exp(np.array([x])), mu)
+            # ln μ at this K_e is i·angle + residual; on the circle its real part is zero.
+            if not np.isfinite(residual[0]) or by_x[0].real == 0:
+                return None
+            move = float(-residual[0].real / by_x[0].real)
+            x += move
+            angle = angle if real else float(angle + residual[0].imag + by_x[0].imag * move)
+            before, change = change, abs(move)
+            if change < 1e-14 or (change >= before and change < 1e-9):
+                break
+        error = min(change, before) + float(noise[0] / abs(by_x[0].real))
+        if not (error < 1e-6 and s.x[i] - 1e-9 <= x <= s.x[i + 1] + 1e-9):
+            return None
+        return _Crossing(
+            int(s.case[i]), x, complex(np.exp(1j * angle)), 1.0 if from_above else -1.0, error + 1e-14
+        )
+
+    def _collected(self, case: int) -> Crossings:
+        own = sorted((c for c in self.found if c.case == case), key=lambda c: c.x)
+        ke = np.exp([c.x for c in own])
+        hertz = [
+            CharacteristicEquation(self.problems[case].with_ke(float(k))).chatter_hz(c.mu)
+            for k, c in zip(ke, own, strict=True)
+        ]
+        direction = np.array([c.direction for c in own])
+        alternating = bool((direction == np.where(np.arange(len(own)) % 2 == 0, 1.0, -1.0)).all())
+        return Crossings(
+            ke,
+            np.array(hertz),
+            direction,
+            np.array([c.error for c in own]),
+            proven=case not in self.undecided and alternating,
+        )
 
 
-def _solved(problem: RubbingBlade, low: float, high: float) -> tuple[float, complex, float]:
-    """Newton's method on det(I − M(e^{iθ}; K_e)e^{−iθ}) = 0 in (θ, K_e), within the bracket."""
-    ke = np.sqrt(low * high)
-    angle = float(np.angle(CharacteristicEquation(problem.with_ke(ke)).crossing_near()))
-    real_root = min(abs(np.sin(angle)), 1.0) < 1e-7
+def _may_cross(s: _Samples, width: np.ndarray, stable: np.ndarray) -> np.ndarray:
+    """Whether the leading branch may come to the circle and back between two samples of one verdict.
 
-    def f(theta: float, k: float) -> complex:
-        return CharacteristicEquation(problem.with_ke(k)).value(np.exp(1j * np.array([theta])))[0]
+    A branch between its two tangents has its peak below their meeting point where it is concave; a
+    quarter of what the slopes could add is allowed for other shapes. Where a pair meets on the real
+    axis and goes on as two real multipliers, or the reverse, one of them may rise as a square root.
+    """
+    left, right = slice(None, -1), slice(1, None)
+    h = width[:, None]
+    with np.errstate(invalid="ignore"):
+        ahead = s.growth[left] + s.slope[left] * h  # at the right end, by the tangents of the left one
+        behind = s.growth[right] - s.slope[right] * h
+        from_left = np.maximum(s.growth[left], ahead) + _meeting(s, left, h, 1.0)
+        from_right = np.maximum(s.growth[right], behind) + _meeting(s, right, h, -1.0)
+        peaks = np.array([from_left.max(axis=1), from_right.max(axis=1)])
+        meets = (_meeting(s, left, h, 1.0) > 0).any(axis=1) | (_meeting(s, right, h, -1.0) > 0).any(axis=1)
+        valley = np.maximum(ahead.max(axis=1), behind.max(axis=1))
+    peak = np.where(meets, peaks.max(axis=0), peaks.min(axis=0))
+    steepest = np.maximum(np.abs(s.slope[left]).max(axis=1), np.abs(s.slope[right]).max(axis=1))
+    margin = 0.25 * steepest * width
+    island = stable[left] & stable[right] & (peak + margin > 0)
+    # A window of stability: every branch outside comes in, and another goes out before the next sample.
+    window = ~stable[left] & ~stable[right] & (valley - margin < 0)
+    return island | window
 
-    change = np.inf
-    for _ in range(25):
-        h, g = 1e-6, 1e-6 * ke
-        value = f(angle, ke)
-        by_ke = (f(angle, ke + g) - f(angle, ke - g)) / (2 * g)
-        if real_root:  # at μ = ±1 the determinant is real and θ stays
-            move_angle, move_ke = 0.0, -value.real / by_ke.real if by_ke.real else np.inf
-        else:
-            by_angle = (f(angle + h, ke) - f(angle - h, ke)) / (2 * h)
-            jacobian = np.array([[by_angle.real, by_ke.real], [by_angle.imag, by_ke.imag]])
-            try:
-                move_angle, move_ke = np.linalg.solve(jacobian, [-value.real, -value.imag])
-            except np.linalg.LinAlgError:
-                return ke, np.exp(1j * angle), np.inf
-        if not np.isfinite(move_ke) or abs(move_ke) > 0.05 * ke:
-            return ke, np.exp(1j * angle), np.inf
-        angle, ke, change = angle + move_angle, ke + move_ke, abs(move_ke) / ke
-        if change < 1e-12:
-            break
-    inside = low * (1 - 1e-6) <= ke <= high * (1 + 1e-6)
-    return ke, complex(np.exp(1j * angle)), change + 1e-13 if inside and change < 1e-8 else np.inf
+
+def _meeting(s: _Samples, at: slice, h: np.ndarray, sense: float) -> np.ndarray:
+    """What ln |μ| may gain within h where two multipliers meet on the real axis, shape (s, l).
+
+    With δ² = b (x₀ − x) the distance δ from meeting, b is 2δ|dδ/dx|, and beyond the meeting the
+    two part by √(b h) at most.
+    """
+    angle, turn = s.angle[at], s.turn[at]
+    there = np.isfinite(s.growth[at])
+    off = np.minimum(np.abs(angle), np.pi - np.abs(angle))  # of a pair from the axis
+    closing = np.where(np.abs(angle) < 0.5 * np.pi, -turn, turn) * np.sign(angle) * sense
+    # Two real multipliers of one sign, next to one another by size: half their distance.
+    growth, slope = s.growth[at], s.slope[at]
+    real = there & (off == 0)
+    gap, shrinks = np.zeros_like(growth), np.zeros_like(growth)
+    for j in range(growth.shape[1] - 1):
+        twins = real[:, j] & real[:, j + 1] & (angle[:, j] == angle[:, j + 1])
+        with np.errstate(invalid="ignore"):
+            gap[:, j] = np.where(twins, 0.5 * (growth[:, j] - growth[:, j + 1]), 0.0)
+            shrinks[:, j] = np.where(twins, -0.5 * (slope[:, j] - slope[:, j + 1]) * sense, 0.0)
+    distance, speed = np.where(off > 0, off, gap), np.where(off > 0, closing, shrinks)
+    soon = there & (speed > 0) & (distance > 0) & (distance < 4 * speed * h)
+    return np.where(soon, np.sqrt(2 * distance * np.maximum(speed, 0.0) * h), 0.0)

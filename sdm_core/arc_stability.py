@@ -15,7 +15,16 @@ from sdm_core.parallel import available_cores, in_threads
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits
-_STRONG_EXPONENTS = (12.0, 15.0, 8.0, 5.0)  # tried in turn where the circle is out of reach
+_STRONG_EXPONENTS = (
+    12.0,
+    15.0,
+    18.0,
+    8.0,
+    10.0,
+    21.0,
+    5.0,
+    13.5,
+)  # tried in turn where the circle is out of reach
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
 _CHUNK, _FEWEST = 250, 50  # problems solved together
 
@@ -140,8 +149,8 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         out.error_estimate[rows[strong[far]]] = found.error_estimate[far, 0]
         strong = strong[~far]
     for k in rest:
-        count = int(out.outside[rows[k]])
-        if (dominant or count < 0) and out.multiplier[rows[k]] == 0:
-            out.multiplier[rows[k]], out.error_estimate[rows[k]] = CharacteristicEquation(
-                problems[k]
-            ).dominant(None if count < 0 else count)
+        count, equation = int(out.outside[rows[k]]), CharacteristicEquation(problems[k])
+        if out.multiplier[rows[k]] != 0 or not (dominant or count < 0):
+            continue
+        found_one = equation.dominant(None if count < 0 else count) if dominant else equation.one_outside()
+        out.multiplier[rows[k]], out.error_estimate[rows[k]] = found_one

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_boundary import arc_crossings
+from sdm_core.arc_boundary import boundaries_with_arcs
 from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade
 from sdm_core.closed_form import Crossings
@@ -67,7 +67,7 @@ def boundary(
     """Exact stability boundary at each rotor speed.
 
     In permanent contact the closed form, each first crossing proven on both sides by the root
-    count; with arcs a proven scan of K_e.
+    count; with arcs the multipliers are followed over K_e.
 
     Raises
     ------
@@ -88,15 +88,10 @@ def boundary(
     speed = speeds("speed_hz", speed_hz)
     number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
     problems = RubbingBlade.at_speeds(blade, contact, speed, extrapolate=extrapolate)
-    found: list[Crossings] = []
     if contact.permanent:
         found = permanent_crossings(problems, ke_max, progress=progress, root_count=unstable_root_count)
     else:
-        for i, problem in enumerate(problems):
-            checkpoint()
-            found.append(arc_crossings(problem, ke_max))
-            if progress is not None:
-                progress(i + 1, len(problems))
+        found = boundaries_with_arcs(problems, ke_max, progress=progress)
     return BoundarySolution(
         speed,
         float(ke_max),

@@ -168,6 +168,15 @@ class CharacteristicEquation:
                 radius = np.sqrt(low * high)
         return complex(best.real, abs(best.imag)), np.inf
 
+    def one_outside(self) -> tuple[complex, float]:
+        """Some multiplier outside the unit circle and the relative error of its modulus; zero if none is met."""
+        for radius in (1.5, 4.0, 12.0):
+            for starts in self._starts(radius):
+                best = max([0j, *self._newton(starts)], key=abs)
+                if abs(best) > 1.0:
+                    return complex(best.real, abs(best.imag)), self._newton_step(best)
+        return 0j, np.inf
+
     def chatter_hz(self, mu: complex) -> float:
         """Frequency of the largest Fourier component of the contact displacement, Hz.
 

@@ -174,20 +174,13 @@ def _polished(
     """Multipliers after Newton's method on T(u)x = 0, and their relative errors."""
     u = 1.0 / mu
     own, stiffness = expansion[case], ke[case]
-    d = expansion.coefficients.shape[-1]
-    rng = np.random.default_rng(d)
-    seed = rng.normal(size=(2, d)) + 1j * rng.normal(size=(2, d))
     change = np.full(len(u), np.inf)
     moved = np.zeros(len(u))
     slope = np.ones(len(u))
     for _ in range(4):
         before = change
-        t, t_slope, scale = _pencil(own, stiffness, u)
-        x = _inverse_step(t, seed[0], scale)
-        y = _inverse_step(t.conj().swapaxes(1, 2), seed[1], scale)
-        x /= np.linalg.norm(x, axis=1, keepdims=True)
-        y /= np.linalg.norm(y, axis=1, keepdims=True)
-        left = y.conj().swapaxes(1, 2)
+        t, t_slope, scale, _ = _pencil(own, stiffness, u)
+        x, left = null_vectors(t, scale)
         slope = (left @ t_slope @ x)[:, 0, 0]
         with np.errstate(all="ignore"):
             step = (left @ t @ x)[:, 0, 0] / slope
@@ -203,6 +196,41 @@ def _polished(
     error = np.minimum(change, before) + floor
     strayed = moved > 1e-3  # the series was better than that: Newton went to another multiplier
     return 1.0 / u, np.where(strayed, np.inf, error)
+
+
+def null_vectors(t: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Right and left null vectors of nearly singular T, unit length, shapes (k, d, 1) and (k, 1, d)."""
+    d = t.shape[-1]
+    rng = np.random.default_rng(d)
+    seed = rng.normal(size=(2, d)) + 1j * rng.normal(size=(2, d))
+    x = _inverse_step(t, seed[0], scale)
+    y = _inverse_step(t.conj().swapaxes(1, 2), seed[1], scale)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return x, y.conj().swapaxes(1, 2)
+
+
+def slopes(
+    expansion: ContactExpansion, ke: np.ndarray, mu: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Newton's correction and derivatives of a multiplier, by T(u)x = 0 with its null vectors.
+
+    Returns
+    -------
+    yᴴTx/(yᴴT_u x u), what Newton's method would take from ln u; d ln μ/d ln K_e; and the rounding
+    error of ln μ; each of shape (k,).
+    """
+    u = 1.0 / mu
+    t, by_u, scale, slope = _pencil(expansion, ke, u)
+    x, left = null_vectors(t, scale)
+    # T = I − u M(K_e(u − 1)): with K_e it changes by −u (u − 1) M'.
+    by_ke = -(u * (u - 1))[:, None, None] * slope
+    with np.errstate(all="ignore"):
+        own = (left @ by_u @ x)[:, 0, 0] * u
+        residual = (left @ t @ x)[:, 0, 0] / own
+        change = (left @ by_ke @ x)[:, 0, 0] * ke / own
+        noise = (4 * _EPS + expansion.noise) * scale / np.abs(own)
+    return residual, change, noise
 
 
 def _inverse_step(t: np.ndarray, seed: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -223,10 +251,10 @@ def _inverse_step(t: np.ndarray, seed: np.ndarray, scale: np.ndarray) -> np.ndar
 
 def _pencil(
     expansion: ContactExpansion, ke: np.ndarray, u: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """T(u), dT/du and the size of u M, shapes (k, d, d), (k, d, d), (k,)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """T(u), dT/du, the size of u M and M'(c), shapes (k, d, d), (k, d, d), (k,), (k, d, d)."""
     m, m_slope = expansion.fundamental_and_slope((ke * (u - 1))[:, None])
     m, m_slope = m[:, 0], m_slope[:, 0]
     t = np.eye(m.shape[-1]) - u[:, None, None] * m
     t_slope = -m - (u * ke)[:, None, None] * m_slope
-    return t, t_slope, np.abs(u) * np.maximum(expansion.size, 1.0)
+    return t, t_slope, np.abs(u) * np.maximum(expansion.size, 1.0), m_slope

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sdm_core.delay_equation import DelayEquation
-from sdm_core.semi_discretization.dense import Averaged
+from sdm_core.errors import TooMuchWork
+from sdm_core.semi_discretization.averaged import StructuredAveraged
+from sdm_core.semi_discretization.structured import Structured
 
-ORDER = 2  # of the averaged scheme in the step
+_FOLLOWED = 20  # multipliers of both half-planes
+_AVERAGED = StructuredAveraged(aligned=True)
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,8 @@ class ConvergedMultiplier:
 class Converged:
     """Doubles the steps until Richardson's extrapolations agree to the tolerance.
 
-    With an error c·N⁻² the extrapolation (4μ_{2N} − μ_N)/3 removes the leading term; the estimate
-    is the change from the last extrapolation to this one, or a quarter of the one before. The
+    With an error c·N⁻ᵖ the extrapolation (2ᵖμ_{2N} − μ_N)/(2ᵖ − 1) removes the leading term; the
+    estimate is the change from the last extrapolation to this one, or 2⁻ᵖ of the one before. The
     leading few multipliers are extrapolated side by side, because the largest at a coarse step
     need not be the largest.
 
@@ -50,44 +53,52 @@ class Converged:
     first_steps
         N to start from.
     largest_state
-        Bound on the rows of the monodromy matrix; when it stops the refinement the answer says
+        Bound on the entries of the discrete state; when it stops the refinement the answer says
         that it has not converged.
+    scheme
+        What is refined; its own number of steps does not matter.
     """
 
     tolerance: float = 1e-4
     first_steps: int = 20
-    largest_state: int = 2000
+    largest_state: int = 100_000
+    scheme: Structured = _AVERAGED
 
     def dominant(self, equation: DelayEquation) -> ConvergedMultiplier:
         """Dominant multiplier of the equation."""
-        # No oscillation may fall between two steps.
+        # No oscillation may fall between two steps; those of high order hold more of one.
         mean_a, _ = equation.means(np.zeros(1), np.full(1, equation.tau))
         fastest = float(np.abs(np.linalg.eigvals(mean_a[0]).imag).max()) * equation.tau / (2 * np.pi)
-        steps = max(self.first_steps, 4 * int(np.ceil(min(fastest, self.largest_state))))
+        oscillations = int(np.ceil(min(fastest, self.largest_state)))
+        steps = max(self.first_steps, -(-8 * oscillations // self.scheme.order))
         spectra: list[np.ndarray] = []
         answer = ConvergedMultiplier(complex(np.nan, np.nan), np.inf, 0, False)
-        while Averaged(steps).state_size(equation) <= self.largest_state:
-            spectra.append(_leading(Averaged(steps).multipliers(equation)))
-            answer = self._extrapolated(spectra, steps)
-            if answer.converged:
+        while not answer.converged:
+            scheme = replace(self.scheme, steps=steps)
+            try:
+                if scheme.state_size(equation) > self.largest_state:
+                    break
+                spectra.append(_leading(scheme.multipliers(equation, _FOLLOWED)))
+            except TooMuchWork:
                 break
+            answer = self._extrapolated(spectra, steps)
             steps *= 2
         return answer
 
     def _extrapolated(self, spectra: list[np.ndarray], steps: int) -> ConvergedMultiplier:
-        fine = spectra[-1]
+        fine, falls = spectra[-1], 2**self.scheme.order
         if len(spectra) < 4:
             return ConvergedMultiplier(complex(fine[0]), np.inf, steps, False)
         middle = _nearest(fine, spectra[-2])
         coarse = _nearest(middle, spectra[-3])
         coarsest = _nearest(coarse, spectra[-4])
-        better = _richardson(fine, middle)
-        change = np.abs(better - _richardson(middle, coarse))
-        # Where arcs end between two steps the error does not fall smoothly, and one small change may
+        better = _richardson(fine, middle, falls)
+        change = np.abs(better - _richardson(middle, coarse, falls))
+        # Where coefficients jump inside a step the error does not fall smoothly, and one small change may
         # be chance: the change before it counts too, at the rate of the scheme.
-        before = np.abs(_richardson(middle, coarse) - _richardson(coarse, coarsest))
-        change = np.maximum(change, before / 2**ORDER)
-        slow = np.abs(middle - coarse) < 2 * np.abs(fine - middle)  # not yet falling as N⁻²
+        before = np.abs(_richardson(middle, coarse, falls) - _richardson(coarse, coarsest, falls))
+        change = np.maximum(change, before / falls)
+        slow = np.abs(middle - coarse) < 2 * np.abs(fine - middle)  # not yet falling
         change = np.where(slow, np.maximum(change, np.abs(fine - middle)), change)
         best = int(np.argmax(np.abs(better)))
         # What any of the others may still gain counts against the answer.
@@ -96,8 +107,8 @@ class Converged:
         return ConvergedMultiplier(complex(better[best]), estimate, steps, estimate <= self.tolerance)
 
 
-def _richardson(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    return fine + (fine - coarse) / (2**ORDER - 1)
+def _richardson(fine: np.ndarray, coarse: np.ndarray, falls: int) -> np.ndarray:
+    return fine + (fine - coarse) / (falls - 1)
 
 
 def _leading(mu: np.ndarray, most: int = 10) -> np.ndarray:

@@ -9,9 +9,9 @@ from named_problems import benchmark_blade, random_problem, receptance
 
 from sdm_core.arc_boundary import least_destabilising_ke
 from sdm_core.boundary import boundary, verdicts
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import crossings
 from sdm_core.contact import ContactConfiguration
+from sdm_core.fredholm import LeadingMultipliers
 from sdm_core.receptance import swept
 from sdm_core.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
@@ -135,8 +135,15 @@ def test_no_crossing_lies_below_the_small_gain_bound(seed):
 
 def test_an_arc_boundary_with_an_undecided_verdict_is_not_proven(monkeypatch):
     contact = ContactConfiguration({"tip": 1.0}, ARCS["one arc"])
-    monkeypatch.setattr(CharacteristicEquation, "count_outside", lambda self, radius=1.0: None)
-    undecided = SimpleNamespace(stable=np.array([np.nan]))
-    monkeypatch.setattr("sdm_core.arc_boundary.batch_multipliers", lambda *_, **__: undecided)
+
+    def unresolved(expansion, ke):
+        none = np.zeros(len(ke), dtype=bool)
+        return LeadingMultipliers(np.zeros((len(ke), 1)), np.zeros((len(ke), 1)), np.full(len(ke), -1), none)
+
+    monkeypatch.setattr("sdm_core.arc_boundary.leading_multipliers", unresolved)
+    monkeypatch.setattr(
+        "sdm_core.arc_boundary.batch_multipliers",
+        lambda problems, **_: SimpleNamespace(stable=np.full(len(problems), np.nan)),
+    )
     found = boundary(benchmark_blade(), contact, np.array([0.23]), 1.0)
     assert np.isinf(found.error_estimate).all()
