@@ -9,6 +9,7 @@ from named_problems import benchmark_blade, random_problem, receptance
 
 from sdm_core.arc_boundary import least_destabilising_ke
 from sdm_core.boundary import boundary, verdicts
+from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import crossings
 from sdm_core.contact import ContactConfiguration
 from sdm_core.fredholm import LeadingMultipliers
