@@ -10,7 +10,7 @@ import numpy as np
 from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.characteristic import CharacteristicEquation, count_outside
 from sdm_core.contact_expansion import ContactExpansion
-from sdm_core.fredholm import leading_multipliers
+from sdm_core.fredholm import LeadingMultipliers, leading_multipliers
 from sdm_core.parallel import available_cores, in_threads
 from sdm_core.rubbing_blade import RubbingBlade
 
@@ -44,13 +44,18 @@ class BatchMultipliers:
     outside
         Multipliers outside the unit circle, −1 where not decided.
     by_series
-        False where the equation was solved point by point.
+        False where the series did not reach the circle.
+    leading, leading_error
+        The largest ones of the upper half-plane and their relative errors, shape (b, listed), zero
+        where there are no more or where they are not known.
     """
 
     multiplier: np.ndarray
     error_estimate: np.ndarray
     outside: np.ndarray
     by_series: np.ndarray
+    leading: np.ndarray
+    leading_error: np.ndarray
 
     @property
     def stable(self) -> np.ndarray:
@@ -65,6 +70,7 @@ def batch_multipliers(
     problems: Sequence[RubbingBlade],
     *,
     dominant: bool = True,
+    listed: int = 1,
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> BatchMultipliers:
@@ -78,6 +84,8 @@ def batch_multipliers(
     dominant
         False where only the number of unstable ones is asked for: multipliers far inside the circle
         are then not looked for, and come back as zero.
+    listed
+        How many leading multipliers are made exact and given.
     progress
         Called with problems solved and their number, in the calling thread.
     threads
@@ -85,7 +93,12 @@ def batch_multipliers(
     """
     b = len(problems)
     out = BatchMultipliers(
-        np.zeros(b, dtype=complex), np.full(b, np.inf), np.full(b, -1), np.zeros(b, dtype=bool)
+        np.zeros(b, dtype=complex),
+        np.full(b, np.inf),
+        np.full(b, -1),
+        np.zeros(b, dtype=bool),
+        np.zeros((b, listed), dtype=complex),
+        np.zeros((b, listed)),
     )
     modes = np.array([len(p.omega) for p in problems])
     threads = available_cores() if threads is None else threads
@@ -107,8 +120,16 @@ def batch_multipliers(
     return out
 
 
+def _list(out: BatchMultipliers, at: np.ndarray, found: LeadingMultipliers, rows: np.ndarray) -> None:
+    out.multiplier[at] = found.multiplier[rows, 0]
+    out.error_estimate[at] = found.error_estimate[rows, 0]
+    most = min(out.leading.shape[1], found.multiplier.shape[1])
+    out.leading[at, :most] = found.multiplier[rows, :most]
+    out.leading_error[at, :most] = found.error_estimate[rows, :most]
+
+
 def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool) -> None:
-    motion = ArcPropagation.of(problems)
+    motion, listed = ArcPropagation.of(problems), out.leading.shape[1]
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
@@ -123,11 +144,10 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         # At least as far as the circle, else the largest disc whose series holds its digits.
         reach = np.maximum(_REACHES[0], np.minimum(factor * slowest[todo], _LARGEST_EXPONENT / growth[todo]))
         series = ContactExpansion.of(motion[todo], centre[todo], reach)
-        found = leading_multipliers(series, ke[todo])
+        found = leading_multipliers(series, ke[todo], polished=listed)
         decided = (found.outside >= 0) & ((found.multiplier[:, 0] != 0) | (not dominant))
         at = rows[todo[decided]]
-        out.multiplier[at] = found.multiplier[decided, 0]
-        out.error_estimate[at] = found.error_estimate[decided, 0]
+        _list(out, at, found, decided)
         out.outside[at] = found.outside[decided]
         out.by_series[at] = True
         todo = todo[~decided]
@@ -143,10 +163,10 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         if len(strong) == 0:
             break
         reach = np.minimum(exponent / growth[strong], 0.99)
-        found = leading_multipliers(ContactExpansion.of(motion[strong], centre[strong], reach), ke[strong])
+        expansion = ContactExpansion.of(motion[strong], centre[strong], reach)
+        found = leading_multipliers(expansion, ke[strong], polished=listed)
         far = found.resolved & (found.multiplier[:, 0] != 0)
-        out.multiplier[rows[strong[far]]] = found.multiplier[far, 0]
-        out.error_estimate[rows[strong[far]]] = found.error_estimate[far, 0]
+        _list(out, rows[strong[far]], found, far)
         strong = strong[~far]
     for k in rest:
         count, equation = int(out.outside[rows[k]]), CharacteristicEquation(problems[k])
@@ -154,3 +174,4 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
             continue
         found_one = equation.dominant(None if count < 0 else count) if dominant else equation.one_outside()
         out.multiplier[rows[k]], out.error_estimate[rows[k]] = found_one
+        out.leading[rows[k], 0], out.leading_error[rows[k], 0] = found_one

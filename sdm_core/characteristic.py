@@ -169,7 +169,7 @@ class CharacteristicEquation:
         return complex(best.real, abs(best.imag)), np.inf
 
     def one_outside(self) -> tuple[complex, float]:
-        """Some multiplier outside the unit circle and the relative error of its modulus; zero if none is met."""
+        """Some multiplier outside the circle and the relative error of its modulus; zero if none is met."""
         for radius in (1.5, 4.0, 12.0):
             for starts in self._starts(radius):
                 best = max([0j, *self._newton(starts)], key=abs)

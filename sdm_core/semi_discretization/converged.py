@@ -29,12 +29,26 @@ class ConvergedMultiplier:
         Steps per revolution of the finest solution.
     converged
         Whether the estimate is within the tolerance asked for.
+    leading, leading_error
+        The largest ones of the upper half-plane and the relative errors of their moduli.
     """
 
     multiplier: complex
     error_estimate: float
     steps: int
     converged: bool
+    leading: tuple[complex, ...] = ()
+    leading_error: tuple[float, ...] = ()
+
+    @property
+    def outside(self) -> int | None:
+        """Multipliers outside the circle; None where one may lie on it, or all that are known are outside."""
+        modulus = np.abs(self.leading)
+        if not self.converged or not (modulus < 1).any():
+            return None
+        unsure = np.abs(modulus - 1) <= np.array(self.leading_error) * modulus
+        each = np.where(np.abs(np.imag(self.leading)) > 0, 2, 1)
+        return None if unsure.any() else int(((modulus > 1) * each).sum())
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,16 @@ class Converged:
         # What any of the others may still gain counts against the answer.
         rival = np.max(np.abs(better) + np.where(slow, change, 0.0)) - np.abs(better[best])
         estimate = float(max(change[best], rival) / max(np.abs(better[best]), 1e-300))
-        return ConvergedMultiplier(complex(better[best]), estimate, steps, estimate <= self.tolerance)
+        order = np.argsort(-np.abs(better), kind="stable")
+        each = change[order] / np.maximum(np.abs(better[order]), 1e-300)
+        return ConvergedMultiplier(
+            complex(better[best]),
+            estimate,
+            steps,
+            estimate <= self.tolerance,
+            tuple(complex(mu) for mu in better[order]),
+            tuple(float(error) for error in each),
+        )
 
 
 def _richardson(fine: np.ndarray, coarse: np.ndarray, falls: int) -> np.ndarray:

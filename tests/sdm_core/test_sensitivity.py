@@ -14,7 +14,10 @@ from sdm_core.arc_boundary import least_destabilising_ke
 from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade, ModalState, example_blade
+from sdm_core.blade_sensitivity import critical_ke_sensitivities, growth_sensitivities
 from sdm_core.boundary import boundary
+from sdm_core.characteristic import CharacteristicEquation
+from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.permanent_boundary import permanent_crossings
@@ -22,9 +25,7 @@ from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 from sdm_core.sensitivity import (
     Gradient,
     chatter_hz_gradient,
-    critical_ke_sensitivities,
     critical_ke_sensitivity,
-    growth_sensitivities,
     multiplier_sensitivity,
 )
 from sdm_core.stability import stability
@@ -331,6 +332,33 @@ def test_a_double_multiplier_is_flagged_also_when_approached_from_afar():
     critical = single_state_problem([100.0], [1.0], [[2.0]], [1.0], 370.0, 0.0)
     found = multiplier_sensitivity(critical, np.exp(-2 * np.pi * 100.0 / 370.0) * (1 + 5e-4))
     assert not found.simple
+
+
+@pytest.mark.parametrize(("speed", "half_turns"), [(42.0, 5), (68.0, 3), (205.0, 1)])
+def test_a_negative_multiplier_in_permanent_contact_is_two_that_pass_through_one_another(speed, half_turns):
+    # Of λ = −ξω + iπk/τ and its conjugate μ is the same, and c real: the oscillator's frequency is kΩ/2.
+    omega, damping = 2 * np.pi * 100.0, 0.01
+    radius = np.exp(-damping * omega / speed)
+    stiffening = (np.pi * half_turns * speed) ** 2 - (1 - damping**2) * omega**2
+    problem = single_state_problem(
+        [100.0], [damping], [[5.0]], [1.0], speed, stiffening / (25 * (1 + 1 / radius))
+    )
+    pencil = np.eye(2) + CharacteristicEquation(problem).fundamental(np.array([-radius]))[0] / radius
+    assert np.linalg.svd(pencil)[1].max() < 1e-12  # both singular values
+    assert Collocation(48).multipliers(problem, 2) == pytest.approx([-radius, -radius], rel=1e-9)
+    found = multiplier_sensitivity(problem, -radius)
+    assert not found.simple and np.isnan(found.growth.omega).all()
+    before, after = (
+        multiplier_sensitivity(
+            replace(problem, speed_hz=speed * (1 + h)), -radius * np.exp(1j * np.pi * half_turns * h)
+        )
+        for h in (-1e-6, 1e-6)
+    )
+    assert before.simple and after.simple
+    assert before.multiplier.imag * after.multiplier.imag < 0
+    for name in ("omega", "damping_ratio", "contact_matrix", "speed_hz"):
+        left, right = (getattr(f.growth, name) for f in (before, after))
+        np.testing.assert_allclose(left, right, rtol=1e-3)
 
 
 def test_where_the_boundary_only_touches_there_is_no_critical_stiffness_to_follow():
