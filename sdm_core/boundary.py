@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,11 +17,13 @@ from sdm_core.interruption import checkpoint
 from sdm_core.permanent_boundary import permanent_crossings
 from sdm_core.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.truncation import change_of_critical_ke, truncation_warnings
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 
 CLOSED_FORM = "closed-form boundary, argument principle"
 CHARACTERISTIC = "exact characteristic equation, argument principle"
 _POINTS_AT_ONCE = 2000
+_ON_AXIS = 1e-9  # of a turn of the multiplier
 
 Progress = Callable[[int, int], None]
 
@@ -44,6 +47,13 @@ class BoundarySolution:
         Intervals of instability up to `ke_max`, (low, high) in N/m, for each speed.
     method
         What was computed, in words.
+    truncation_change
+        Relative change of `critical_ke` when the mode of highest frequency is dropped (`truncation`), shape
+        (m,); NaN where it was not asked for or there is only one mode.
+    warnings
+        What the user should know, in words.
+    cost_s
+        Time taken, s.
     """
 
     speed_hz: np.ndarray
@@ -53,6 +63,29 @@ class BoundarySolution:
     error_estimate: np.ndarray
     unstable_ke: tuple[tuple[tuple[float, float], ...], ...]
     method: str
+    truncation_change: np.ndarray
+    warnings: tuple[str, ...]
+    cost_s: float
+
+    @property
+    def wear_lobes(self) -> np.ndarray:
+        """Lobes that chatter wears into the liner per revolution, chatter frequency over Ω, shape (m,)."""
+        return self.chatter_hz / self.speed_hz
+
+    @property
+    def crossing(self) -> tuple[str | None, ...]:
+        """Kind of each first crossing: ``hopf``, ``flip`` (μ = −1), ``fold`` (μ = 1); None without one."""
+        turns = self.wear_lobes % 1.0
+        return tuple(
+            None
+            if np.isnan(turn)
+            else "flip"
+            if abs(turn - 0.5) < _ON_AXIS
+            else "fold"
+            if min(turn, 1 - turn) < _ON_AXIS
+            else "hopf"
+            for turn in turns
+        )
 
 
 def boundary(
@@ -62,12 +95,24 @@ def boundary(
     ke_max: float,
     *,
     extrapolate: bool = False,
+    truncation: bool = True,
     progress: Progress | None = None,
 ) -> BoundarySolution:
     """Exact stability boundary at each rotor speed.
 
     In permanent contact the closed form, each first crossing proven on both sides by the root
     count; with arcs the multipliers are followed over K_e.
+
+    Parameters
+    ----------
+    speed_hz
+        Hz, shape (m,).
+    ke_max
+        N/m.
+    truncation
+        Whether to find out what the mode of highest frequency contributes, which doubles the cost.
+    progress
+        Called with speeds solved and their number.
 
     Raises
     ------
@@ -85,6 +130,7 @@ def boundary(
     >>> bool(found.error_estimate[0] < 1e-9)
     True
     """
+    start = time.perf_counter()
     speed = speeds("speed_hz", speed_hz)
     number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
     problems = RubbingBlade.at_speeds(blade, contact, speed, extrapolate=extrapolate)
@@ -92,6 +138,9 @@ def boundary(
         found = permanent_crossings(problems, ke_max, progress=progress, root_count=unstable_root_count)
     else:
         found = boundaries_with_arcs(problems, ke_max, progress=progress)
+    change = np.full(len(speed), np.nan)
+    if truncation:
+        change = change_of_critical_ke(problems, ke_max, found)
     return BoundarySolution(
         speed,
         float(ke_max),
@@ -100,6 +149,9 @@ def boundary(
         np.array([_first_error(c) for c in found]),
         tuple(c.unstable_intervals(ke_max) for c in found),
         CLOSED_FORM if contact.permanent else CHARACTERISTIC,
+        change,
+        truncation_warnings(change),
+        time.perf_counter() - start,
     )
 
 

@@ -196,10 +196,3 @@ def operating_range(blade: Blade) -> tuple[float, float]:
 def evenly_spaced(low_hz: float, high_hz: float, count: int) -> np.ndarray:
     """`count` speeds in Hz, evenly spaced: the abscissa of a map."""
     return np.linspace(low_hz, high_hz, count)
-
-
-def evenly_timed(low_hz: float, high_hz: float, count: int) -> np.ndarray:
-    """`count` rising speeds in Hz, evenly spaced in 1/Ω, in which lobes are periodic (DESIGN, fact 6)."""
-    speeds = 1.0 / np.linspace(1.0 / low_hz, 1.0 / high_hz, count)
-    speeds[0], speeds[-1] = low_hz, high_hz  # not an ulp beyond the modal data
-    return speeds

@@ -52,6 +52,7 @@ def run(
     """
     from dataclasses import asdict
 
+    from sdm_core.lobe_tips import lobe_grid
     from service.commands.inputs import (
         answerer_from,
         blade_from,
@@ -70,7 +71,6 @@ def run(
     )
     from service.commands.tables import critical_speeds_table
     from service.rest.replies import boundary_to_dict
-    from service.screening.lobe_tips import lobe_grid
     from service.screening.sweep import cut_off, searched, through_tips
     from service.speeds import evenly_spaced
 

@@ -89,9 +89,9 @@ def check_work(
     InvalidInput
         Naming the option, its value and the remedy.
     """
+    from sdm_core.lobe_tips import lobe_grid
     from service.commands.serve import settings_from
     from service.rest.limits import check_reach
-    from service.screening.lobe_tips import lobe_grid
 
     try:
         if here:

@@ -100,9 +100,9 @@ def run(
     if npz:
         write_bytes("--npz", npz, map_to_npz(answers))
     if png:
+        from sdm_core.lobe_tips import SEARCH_MARGIN, lobe_grid
         from sdm_core.validation import KE_LIMIT
         from service.screening.charts import map_png
-        from service.screening.lobe_tips import SEARCH_MARGIN, lobe_grid
 
         # With arcs an exact line takes minutes, and the map is exact anyway.
         line = None

@@ -11,7 +11,7 @@ from rich.table import Table
 from service.screening.screen import UNSTABLE
 
 if TYPE_CHECKING:
-    from service.screening.lobe_tips import CriticalSpeed
+    from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
 
 

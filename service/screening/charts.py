@@ -23,7 +23,7 @@ from training.answers import EXACT, BoundaryAnswers, MapAnswers
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from service.screening.lobe_tips import CriticalSpeed
+    from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
 
 DPI = 300

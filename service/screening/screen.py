@@ -11,9 +11,9 @@ import numpy as np
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
+from sdm_core.lobe_tips import CriticalSpeed, lobe_grid
 from sdm_core.validation import KE_LIMIT, number
 from service.answerer import Answerer
-from service.screening.lobe_tips import CriticalSpeed, lobe_grid
 from service.screening.sweep import Progress, searched, through_tips
 from service.speeds import SpeedRange, evenly_spaced, operating_range
 from training.answers import EXACT, BoundaryAnswers, MapAnswers

@@ -9,14 +9,14 @@ import numpy as np
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
+from sdm_core.lobe_tips import SEARCH_MARGIN, CriticalSpeed, deepest_lobe_tips
 from sdm_core.validation import KE_LIMIT
 from service.answerer import Answerer
-from service.screening.lobe_tips import SEARCH_MARGIN, CriticalSpeed, deepest_lobe_tips
 from training.answers import EXACT, BoundaryAnswers
 
 Progress = Callable[[int, int, str], None]
 
-# With arcs the exact core takes up to a second a speed, and a service answers within minutes.
+# With arcs the exact core takes up to half a second a speed, and a service answers within minutes.
 SPEEDS_A_PART = 100
 # With arcs fewer tips are looked for, for the same reason.
 TIPS, TIPS_WITH_ARCS = 8, 4

@@ -10,8 +10,8 @@ import pytest
 from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, InvalidInput, OutOfSpeedRange
+from sdm_core.lobe_tips import deepest_lobe_tips, lobe_grid
 from service.rest.replies import to_json
-from service.screening.lobe_tips import deepest_lobe_tips, lobe_grid
 from service.screening.screen import STABLE, UNDECIDED, UNSTABLE, default_contacts, screen
 from service.screening.sweep import cut_off, swept
 from service.speeds import SpeedRange

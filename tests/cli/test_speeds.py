@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from sdm_core.blade import Blade, ModalState, example_blade
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
-from service.speeds import Speed, SpeedRange, evenly_timed, operating_range
+from sdm_core.lobe_tips import evenly_timed
+from service.speeds import Speed, SpeedRange, operating_range
 
 positive = st.floats(min_value=1e-3, max_value=1e5)
 

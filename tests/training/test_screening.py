@@ -130,7 +130,7 @@ def test_the_surrogate_alone_refuses_what_lies_outside_its_domain(screener, roto
 
 
 def test_more_exact_work_than_allowed_is_refused(rotor_37):
-    small = Screener(None, exact_budget_s=1.0)
+    small = Screener(None, exact_budget_s=0.5)
     with pytest.raises(TooMuchWork, match="at most 25"):
         small.points(rotor_37, LE, np.full(30, 250.0), np.full(30, 1e3), policy="exact")
     with pytest.raises(TooMuchWork):

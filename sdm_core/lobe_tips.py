@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
 from sdm_core.blade import Blade
+from sdm_core.boundary import boundary
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
-from service.speeds import evenly_timed
-from training.answers import BoundaryAnswers
+from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 
 # A lobe's edge is about K_e ∝ 1/|sin(2πf/Ω)|: 8 speeds a lobe of the highest mode bracket every tip,
 # and a parabola through the lowest three ranks the tips to better than 1 %.
@@ -23,6 +24,19 @@ FEWEST_SPEEDS, MOST_SPEEDS = 64, 2000
 SEARCH_MARGIN = 1.2
 SPEEDS_TO_BEGIN = 9
 MOST_ROUNDS = 10
+
+
+class FirstCrossings(Protocol):
+    """First crossings over rotor speeds, as a `BoundarySolution` has them, each of shape (m,)."""
+
+    @property
+    def speed_hz(self) -> np.ndarray: ...
+    @property
+    def critical_ke(self) -> np.ndarray: ...
+    @property
+    def chatter_hz(self) -> np.ndarray: ...
+    @property
+    def error_estimate(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,64 @@ class CriticalSpeed:
     def proven(self) -> bool:
         """False where the core could not prove that `ke` is the first crossing."""
         return bool(np.isfinite(self.error_estimate))
+
+
+def evenly_timed(low_hz: float, high_hz: float, count: int) -> np.ndarray:
+    """`count` rising speeds in Hz, evenly spaced in 1/Ω, in which lobes are periodic (DESIGN, fact 6)."""
+    speeds = 1.0 / np.linspace(1.0 / low_hz, 1.0 / high_hz, count)
+    speeds[0], speeds[-1] = low_hz, high_hz  # not an ulp beyond the modal data
+    return speeds
+
+
+def least_critical_ke(
+    blade: Blade,
+    contact: ContactConfiguration,
+    low_hz: float,
+    high_hz: float,
+    ke_max: float,
+    *,
+    count: int = 8,
+    tolerance: float = 1e-4,
+) -> tuple[CriticalSpeed, ...]:
+    """The tips of the deepest lobes over a range of speeds, smallest K_e first, by the exact core.
+
+    The first is the smallest K_e that destabilises anywhere in the range; tips fall between the
+    speeds of any grid, so each is refined until K_e changes by no more than `tolerance`, relative.
+
+    Parameters
+    ----------
+    low_hz, high_hz
+        Range of rotor speeds, Hz.
+    ke_max
+        Tips above it are left out, N/m.
+
+    Raises
+    ------
+    InvalidInput
+        For an unusable range or stiffness, or more lobes than can be followed.
+
+    Examples
+    --------
+    >>> from sdm_core.blade import example_blade
+    >>> found = least_critical_ke(
+    ...     example_blade("nasa_rotor_37"), ContactConfiguration.at("LE"), 150.0, 300.0, 2.5e4
+    ... )
+    >>> found[0].ke <= found[1].ke
+    True
+    """
+    number("low_hz", low_hz, *SPEED_LIMITS_HZ, "Hz")
+    number("high_hz", high_hz, *SPEED_LIMITS_HZ, "Hz")
+    number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+    if low_hz >= high_hz:
+        raise InvalidInput("low_hz", low_hz, f"give a speed below high_hz = {high_hz:g} Hz")
+    reach = min(SEARCH_MARGIN * ke_max, KE_LIMIT)
+
+    def exact(speed_hz: np.ndarray) -> FirstCrossings:
+        return boundary(blade, contact, speed_hz, reach, truncation=False)
+
+    grid = lobe_grid(blade, contact, np.array([low_hz, high_hz]), ke_max)
+    first = blade.first_frequency_hz
+    return deepest_lobe_tips(exact(grid), exact, first, ke_max=ke_max, count=count, tolerance=tolerance)
 
 
 def lobe_grid(blade: Blade, contact: ContactConfiguration, even_hz: np.ndarray, ke_max: float) -> np.ndarray:
@@ -102,8 +174,8 @@ def _highest_frequency(blade: Blade, contact: ContactConfiguration, ke_max: floa
 
 
 def deepest_lobe_tips(
-    grid: BoundaryAnswers,
-    exact: Callable[[np.ndarray], BoundaryAnswers],
+    grid: FirstCrossings,
+    exact: Callable[[np.ndarray], FirstCrossings],
     first_frequency_hz: float,
     *,
     ke_max: float,
@@ -174,7 +246,7 @@ class _Lobe:
     def least(self) -> float:
         return float(self.ke.min(initial=np.inf))
 
-    def told(self, answer: BoundaryAnswers, part: np.ndarray) -> _Lobe:
+    def told(self, answer: FirstCrossings, part: np.ndarray) -> _Lobe:
         """The lobe with what the core answered at `part` of its speeds."""
         period = np.concatenate((self.period, 1.0 / answer.speed_hz[part]))
         ke = np.concatenate((self.ke, np.nan_to_num(answer.critical_ke[part], nan=np.inf)))
