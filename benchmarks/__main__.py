@@ -1,4 +1,4 @@
-"""`make bench`: the comparison with peers, or the measurements named (peers, accuracy, speed)."""
+"""`make bench`: the comparison with peers, or the measurements named (see `MEASUREMENTS`)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from rich.console import Console
 
 MEASUREMENTS = {
     "peers": "benchmarks.peers.report",
+    "arcs": "benchmarks.random_arcs",
+    "convergence": "benchmarks.convergence",
+    "scaling": "benchmarks.scaling",
     "accuracy": "benchmarks.screening_accuracy",
     "speed": "benchmarks.map_speed",
 }

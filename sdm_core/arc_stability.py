@@ -7,24 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.characteristic import CharacteristicEquation, count_outside
 from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.fredholm import LeadingMultipliers, leading_multipliers
 from sdm_core.parallel import available_cores, in_threads
+from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits
-_STRONG_EXPONENTS = (
-    12.0,
-    15.0,
-    18.0,
-    8.0,
-    10.0,
-    21.0,
-    5.0,
-    13.5,
-)  # tried in turn where the circle is out of reach
+# Discs tried in turn where the circle is out of reach; moderate growth has a multiplier on a smaller one.
+_MODERATE, _MODERATE_EXPONENT = 60.0, 6.0
+_STRONG_EXPONENTS = (12.0, 9.0, 15.0, 18.0, 6.0, 10.5, 21.0, 13.5)
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
 _CHUNK, _FEWEST = 250, 50  # problems solved together
 
@@ -100,11 +93,11 @@ def batch_multipliers(
         np.zeros((b, listed), dtype=complex),
         np.zeros((b, listed)),
     )
-    modes = np.array([len(p.omega) for p in problems])
+    kinds = [kind(p) for p in problems]
     threads = available_cores() if threads is None else threads
     parts = []
-    for n in np.unique(modes):
-        members = np.flatnonzero(modes == n)
+    for one in sorted(set(kinds)):
+        members = np.flatnonzero([k == one for k in kinds])
         size = min(_CHUNK, max(_FEWEST, -(-len(members) // threads)))
         parts += [members[i : i + size] for i in range(0, len(members), size)]
     finished = 0
@@ -129,7 +122,7 @@ def _list(out: BatchMultipliers, at: np.ndarray, found: LeadingMultipliers, rows
 
 
 def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool) -> None:
-    motion, listed = ArcPropagation.of(problems), out.leading.shape[1]
+    motion, listed = propagation_of(problems), out.leading.shape[1]
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
@@ -159,10 +152,11 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
     # even where rounding hides the number of the others.
     wanted = growth[rest] * _REACHES[0] >= 1.0
     strong = rest[wanted & (dominant | (out.outside[rows[rest]] < 0))]
-    for exponent in _STRONG_EXPONENTS:
+    for exponent in (_MODERATE_EXPONENT, *_STRONG_EXPONENTS):
         if len(strong) == 0:
             break
-        reach = np.minimum(exponent / growth[strong], 0.99)
+        exponents = np.where(growth[strong] < _MODERATE, exponent, max(exponent, _STRONG_EXPONENTS[0]))
+        reach = np.minimum(exponents / growth[strong], 0.99)
         expansion = ContactExpansion.of(motion[strong], centre[strong], reach)
         found = leading_multipliers(expansion, ke[strong], polished=listed)
         far = found.resolved & (found.multiplier[:, 0] != 0)

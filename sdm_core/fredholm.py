@@ -13,6 +13,7 @@ _SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)
 _NEGLIGIBLE = 1e-13
 _ENOUGH = 1e-11  # of the series: what its zeros are found from, before Newton's method
 _ORIGIN = 1e-3
+_LAST_STEP = 1e-8  # of Newton's method on ln u
 _UNPOLISHED = 1e-5  # relative error of those zeros, also of double ones
 _NEAR_ONE = 1e-3  # of |ln |μ||: multipliers so near the circle are polished before they are counted
 _EPS = np.finfo(float).eps
@@ -174,26 +175,28 @@ def _polished(
     """Multipliers after Newton's method on T(u)x = 0, and their relative errors."""
     u = 1.0 / mu
     own, stiffness = expansion[case], ke[case]
-    change = np.full(len(u), np.inf)
-    moved = np.zeros(len(u))
-    slope = np.ones(len(u))
+    change, before = np.full(len(u), np.inf), np.full(len(u), np.inf)
+    moved, slope, size = np.zeros(len(u)), np.ones(len(u), dtype=complex), np.ones(len(u))
+    go = np.arange(len(u))
     for _ in range(4):
-        before = change
-        t, t_slope, scale, _ = _pencil(own, stiffness, u)
+        t, t_slope, scale, _ = _pencil(own[go], stiffness[go], u[go])
         x, left = null_vectors(t, scale)
-        slope = (left @ t_slope @ x)[:, 0, 0]
+        slope[go], size[go] = (left @ t_slope @ x)[:, 0, 0], scale
         with np.errstate(all="ignore"):
-            step = (left @ t @ x)[:, 0, 0] / slope
+            step = (left @ t @ x)[:, 0, 0] / slope[go]
             step = np.where(np.isfinite(step), step, 0.0)
-            change = np.abs(step / u)
-        step *= np.minimum(1.0, 0.05 / np.maximum(change, 1e-300))
+            before[go], change[go] = change[go], np.abs(step / u[go])
+        step *= np.minimum(1.0, 0.05 / np.maximum(change[go], 1e-300))
         # A multiplier on the real axis stays there.
-        u = np.where(mu.imag == 0, (u - step).real, u - step)
-        moved += np.minimum(change, 0.05)
-        if (change < 1e-13).all() or (change >= before).all():
+        u[go] = np.where(mu[go].imag == 0, (u[go] - step).real, u[go] - step)
+        moved[go] += np.minimum(change[go], 0.05)
+        # Newton's method squares its step: below `_LAST_STEP` the next one is rounding.
+        go = go[(change[go] > _LAST_STEP) & (change[go] < before[go])]
+        if len(go) == 0:
             break
-    floor = 4 * (4 * _EPS + own.noise) * scale / np.maximum(np.abs(slope * u), 1e-300)
-    error = np.minimum(change, before) + floor
+    left_over = np.where(change <= _LAST_STEP, change * _LAST_STEP, np.minimum(change, before))
+    floor = 4 * (4 * _EPS + own.noise) * size / np.maximum(np.abs(slope * u), 1e-300)
+    error = left_over + floor
     strayed = moved > 1e-3  # the series was better than that: Newton went to another multiplier
     return 1.0 / u, np.where(strayed, np.inf, error)
 
