@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.arc_stability import batch_multipliers
 from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.closed_form import Crossings
@@ -15,6 +14,7 @@ from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.fredholm import leading_multipliers, slopes
 from sdm_core.interruption import checkpoint
 from sdm_core.parallel import available_cores, in_threads
+from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
 _WIDEST = 0.12  # of ln K_e between neighbouring samples
@@ -29,7 +29,8 @@ _WEAK = 1.0  # growth up to which one series serves down to zero
 _FOLLOWED = 0.4  # of |ln |μ||: branches that may reach the circle between two samples
 _MOST_ROUNDS = 60
 _POINTS, _SPEEDS = 800, 50  # solved together
-_STRONG_RATIO = 1.06  # between neighbouring stiffnesses beyond the series
+# Between neighbouring stiffnesses beyond the series: of growth by e^11 a revolution, and of any.
+_STRONG_RATIO, _STRONGEST_RATIO = 1.06, 2.0
 
 Progress = Callable[[int, int], None]
 
@@ -66,7 +67,8 @@ def boundaries_with_arcs(
     of K_e, their number outside the circle by the argument principle. Between two samples the
     tangents tell whether a branch may cross the circle and come back: then the interval is
     halved, down to `NARROWEST_ISLAND`. Each change of the verdict is solved for arg μ and K_e together.
-    Where a sample cannot be decided the crossings are not `proven`.
+    A sample that cannot be decided is never called stable; where one lies below the first crossing
+    the crossings are not `proven`.
 
     Parameters
     ----------
@@ -76,11 +78,11 @@ def boundaries_with_arcs(
         N/m.
     """
     out: list[Crossings] = [Crossings.none()] * len(problems)
-    modes = np.array([len(p.omega) for p in problems])
+    kinds = [kind(p) for p in problems]
     threads = available_cores() if threads is None else threads
     parts = []
-    for n in np.unique(modes):
-        rows = np.flatnonzero(modes == n)
+    for one in sorted(set(kinds)):
+        rows = np.flatnonzero([k == one for k in kinds])
         size = min(_SPEEDS, max(4, -(-len(rows) // threads)))
         parts += [rows[i : i + size] for i in range(0, len(rows), size)]
 
@@ -156,14 +158,14 @@ class _Scan:
     def __init__(self, problems: list[RubbingBlade], ke_max: float) -> None:
         self.problems = problems
         self.top = float(np.log(ke_max))
-        self.motion = ArcPropagation.of(problems)
+        self.motion = propagation_of(problems)
         self.shift = self.motion.phase_shift
         low = np.array([least_destabilising_ke(p) for p in problems])
         self.open = np.flatnonzero(low < ke_max)
-        self.bottom = np.log(np.maximum(np.where(np.isfinite(low), low, ke_max), 1e-9 * ke_max))
+        self.bottom = np.log(np.maximum(np.where(np.isfinite(low), low, ke_max), 1e-300))
         self._series_of_bands(ke_max)
         self.found: list[_Crossing] = []
-        self.undecided: set[int] = set()
+        self.undecided: dict[int, float] = {}  # ln K_e of the lowest such sample of a case
 
     def _series_of_bands(self, ke_max: float) -> None:
         case, centre, start = [], [], [0]
@@ -198,7 +200,7 @@ class _Scan:
             samples = samples.merged(new)
         out = [Crossings.none()] * len(self.problems)
         for i in self.open:
-            out[i] = self._collected(int(i))
+            out[i] = self._collected(int(i), samples)
         return out
 
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:
@@ -209,8 +211,11 @@ class _Scan:
             top = float(np.exp(self.top))
             while ke < top:
                 at.append(ke)
-                step = min(ke * np.expm1(_WIDEST), _GREATEST_GROWTH / max(self.shift[i], 1e-300))
-                ke += step if ke * self.shift[i] < _SERIES_HOLD else ke * (_STRONG_RATIO - 1)
+                growth = ke * self.shift[i]
+                if growth < _SERIES_HOLD:
+                    ke += min(ke * np.expm1(_WIDEST), _GREATEST_GROWTH / max(self.shift[i], 1e-300))
+                else:
+                    ke *= min(_STRONG_RATIO ** min(growth / _SERIES_HOLD, 50.0), _STRONGEST_RATIO)
             at.append(top)
             case += [i] * len(at)
             x += list(np.log(at))
@@ -255,13 +260,15 @@ class _Scan:
         strong = np.flatnonzero((outside < 0) & ~followed)
         if len(strong):
             problems = [self.problems[case[k]].with_ke(float(ke[k])) for k in strong]
-            stable = batch_multipliers(problems, dominant=False, threads=1).stable
+            stable = batch_multipliers(problems, dominant=False, thorough=False, threads=1).stable
             outside[strong] = np.where(np.isnan(stable), -1, stable == 0.0)
         for k in np.flatnonzero((outside < 0) & followed):  # on the circle to rounding: a neighbour tells
             alone = CharacteristicEquation(self.problems[case[k]].with_ke(float(ke[k]) * (1 + 1e-7)))
             count = alone.count_outside()
             outside[k] = -1 if count is None else count
-        self.undecided.update(int(i) for i in case[outside < 0])
+        for k in np.flatnonzero(outside < 0):
+            lowest = self.undecided.get(int(case[k]), np.inf)
+            self.undecided[int(case[k])] = min(lowest, float(x[k]))
         none = np.zeros(len(x), dtype=bool)
         out = _Samples(case, x, outside, growth, slope, angle, turn, followed, none)
         return out.merged(_Samples(*(getattr(out, f)[:0] for f in out.__dataclass_fields__)))
@@ -357,21 +364,29 @@ class _Scan:
             int(s.case[i]), x, complex(np.exp(1j * angle)), 1.0 if from_above else -1.0, error + 1e-14
         )
 
-    def _collected(self, case: int) -> Crossings:
-        own = sorted((c for c in self.found if c.case == case), key=lambda c: c.x)
+    def _collected(self, case: int, samples: _Samples) -> Crossings:
+        x, unstable = samples.x[samples.case == case], samples.outside[samples.case == case] != 0
+        own = []
+        for crossing in sorted((c for c in self.found if c.case == case), key=lambda c: c.x):
+            # A second multiplier that leaves where one is out already changes no verdict.
+            after = int(np.searchsorted(x, crossing.x))
+            if 0 < after < len(x) and unstable[after - 1] != unstable[after]:
+                own.append(crossing)
         ke = np.exp([c.x for c in own])
         hertz = [
             CharacteristicEquation(self.problems[case].with_ke(float(k))).chatter_hz(c.mu)
             for k, c in zip(ke, own, strict=True)
         ]
         direction = np.array([c.direction for c in own])
+        lowest = self.undecided.get(case)
+        sure = lowest is None or (len(own) > 0 and lowest > own[0].x)
         alternating = bool((direction == np.where(np.arange(len(own)) % 2 == 0, 1.0, -1.0)).all())
         return Crossings(
             ke,
             np.array(hertz),
             direction,
             np.array([c.error for c in own]),
-            proven=case not in self.undecided and alternating,
+            proven=alternating and sure,
         )
 
 

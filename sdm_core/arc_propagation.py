@@ -167,6 +167,11 @@ class ArcPropagation:
         """
         return 0.5 * np.trace(self.coupling, axis1=1, axis2=2) * self.arcs.sum(axis=1)
 
+    @property
+    def rounding(self) -> np.ndarray:
+        """Rounding of entries of M relative to the largest, shape (b,)."""
+        return np.finfo(float).eps * (1 + self.angle.max(axis=1))
+
     def fundamental(self, case: np.ndarray, c: np.ndarray) -> np.ndarray:
         """M(c) of problem `case` each, shape (k, 2n, 2n); c in N/m, shape (k,)."""
         chunk = max(50, int(600 * (4 / self.size) ** 2))

@@ -63,6 +63,7 @@ def batch_multipliers(
     problems: Sequence[RubbingBlade],
     *,
     dominant: bool = True,
+    thorough: bool = True,
     listed: int = 1,
     progress: Progress | None = None,
     threads: int | None = None,
@@ -77,6 +78,8 @@ def batch_multipliers(
     dominant
         False where only the number of unstable ones is asked for: multipliers far inside the circle
         are then not looked for, and come back as zero.
+    thorough
+        False where points that no series reaches may stay undecided rather than be solved one by one.
     listed
         How many leading multipliers are made exact and given.
     progress
@@ -103,7 +106,7 @@ def batch_multipliers(
     finished = 0
 
     def solve(rows: np.ndarray) -> int:
-        _solve([problems[k] for k in rows], rows, out, dominant)
+        _solve([problems[k] for k in rows], rows, out, dominant, thorough)
         return len(rows)
 
     for solved in in_threads(solve, parts, threads):
@@ -121,7 +124,9 @@ def _list(out: BatchMultipliers, at: np.ndarray, found: LeadingMultipliers, rows
     out.leading_error[at, :most] = found.error_estimate[rows, :most]
 
 
-def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool) -> None:
+def _solve(
+    problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool, thorough: bool
+) -> None:
     motion, listed = propagation_of(problems), out.leading.shape[1]
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
@@ -162,7 +167,7 @@ def _solve(problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers
         far = found.resolved & (found.multiplier[:, 0] != 0)
         _list(out, rows[strong[far]], found, far)
         strong = strong[~far]
-    for k in rest:
+    for k in rest if thorough else ():
         count, equation = int(out.outside[rows[k]]), CharacteristicEquation(problems[k])
         if out.multiplier[rows[k]] != 0 or not (dominant or count < 0):
             continue

@@ -1,4 +1,4 @@
-"""The exact characteristic equation of a rubbing blade, permanent contact or arcs (DESIGN, fact 5)."""
+"""The exact characteristic equation of a rubbing blade, whatever its engagement (DESIGN, fact 5)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.interruption import checkpoint
+from sdm_core.propagation import Propagation, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.smooth_propagation import SmoothPropagation
 from sdm_core.winding import half_turns
 
 _LARGEST_GROWTH = 1e11  # of an entry of M: what is smaller than its rounding error no longer shows
@@ -22,7 +23,7 @@ def determinant(m: np.ndarray, mu: np.ndarray) -> np.ndarray:
         return np.linalg.det(np.eye(m.shape[-1]) - m / mu[:, None, None])
 
 
-def first_points(motion: ArcPropagation, ke: np.ndarray, radius: float = 1.0) -> np.ndarray:
+def first_points(motion: Propagation, ke: np.ndarray, radius: float = 1.0) -> np.ndarray:
     """Points of the half circle |μ| = `radius` to begin a count with, shape (b,).
 
     Contact adds a phase of up to K_e |1/μ − 1| × `phase_shift` over a revolution; those of all
@@ -31,7 +32,7 @@ def first_points(motion: ArcPropagation, ke: np.ndarray, radius: float = 1.0) ->
     return 17 + np.minimum(1000.0, motion.phase_shift * ke * (1 + 1 / radius)).astype(int)
 
 
-def count_outside(motion: ArcPropagation, ke: np.ndarray) -> np.ndarray:
+def count_outside(motion: Propagation, ke: np.ndarray) -> np.ndarray:
     """Multipliers outside the unit circle of each problem of a batch, shape (b,); −1 where not decided."""
 
     def value(case: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -57,7 +58,8 @@ class CharacteristicEquation:
 
     A Floquet solution has x(t − τ) = x(t)/μ, so the delayed force is K_e γ(t) G (1/μ − 1) x and
     the multipliers are the eigenvalues of M(μ) that equal μ: on each arc the coefficients are
-    constant and M is a product of matrix exponentials. Nothing is discretized.
+    constant and M is a product of matrix exponentials, with smooth γ it is integrated to rounding. The
+    delay is not discretized.
 
     Attributes
     ----------
@@ -71,7 +73,7 @@ class CharacteristicEquation:
     evaluations: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        self._motion = ArcPropagation.of([self.problem])
+        self._motion = propagation_of([self.problem])
 
     @property
     def size(self) -> int:
@@ -79,7 +81,7 @@ class CharacteristicEquation:
         return self._motion.size
 
     def fundamental(self, mu: np.ndarray) -> np.ndarray:
-        """M(μ), shape (m, 2n, 2n): by matrix exponentials."""
+        """M(μ), shape (m, 2n, 2n)."""
         mu = np.atleast_1d(np.asarray(mu, dtype=complex))
         self.evaluations += len(mu)
         with np.errstate(all="ignore"):  # near μ = 0, an essential singularity
@@ -183,16 +185,29 @@ class CharacteristicEquation:
         The Floquet solution of multiplier μ is e^{(ln μ/τ)t} times a τ-periodic function; its
         components lie at |arg μ/2π + k|Ω (DESIGN, section 1).
         """
-        p, n = self.problem, len(self.problem.omega)
+        p = self.problem
         if p.contact_factor.shape[1] == 0:  # no mode moves the contact nodes
             return float("nan")
-        nu, vectors = np.linalg.eig(self.fundamental(np.array([mu]))[0])
-        state = vectors[:, np.argmin(np.abs(nu - mu))]
-        # Enough equal samples of a revolution for the fastest oscillation there can be.
+        matrix = self.fundamental(np.array([mu]))[0]
+        # The fastest oscillation there can be.
         fastest = np.sqrt(p.omega.max() ** 2 + 2 * p.ke * np.trace(p.contact_matrix))
-        if not fastest * p.tau < _MOST_OSCILLATIONS:
+        if not (fastest * p.tau < _MOST_OSCILLATIONS and np.isfinite(matrix).all()):
             return float("nan")
-        samples = 64 * int(np.ceil(max(8.0, fastest * p.tau / 8)))
+        nu, vectors = np.linalg.eig(matrix)
+        state = vectors[:, np.argmin(np.abs(nu - mu))]
+        if isinstance(self._motion, SmoothPropagation):
+            motion = self._motion.displacement(0, p.ke * (1 / mu - 1), state)
+        else:
+            motion = self._displacement(mu, state, 64 * int(np.ceil(max(8.0, fastest * p.tau / 8))))
+        samples = len(motion)
+        periodic = motion * np.exp(-np.log(mu) * np.arange(samples) / samples)[:, None]
+        spectrum = (np.abs(np.fft.fft(periodic, axis=0)) ** 2).sum(axis=1)
+        k = np.fft.fftfreq(samples, 1 / samples)[np.argmax(spectrum)]
+        return float(abs(np.angle(mu) / (2 * np.pi) + k) * p.speed_hz)
+
+    def _displacement(self, mu: complex, state: np.ndarray, samples: int) -> np.ndarray:
+        """Fᵀx at equal times of a revolution that begins with `state`, arc by arc, shape (samples, p)."""
+        p, n = self.problem, len(self.problem.omega)
         free, contact = self._rates()
         engaged = free + (1 / mu - 1) * contact
         edges = np.cumsum([0.0, *(s.length for s in p.segments)])
@@ -205,10 +220,7 @@ class CharacteristicEquation:
             history = modes[:n] @ (amplitude[:, None] * np.exp(rates[:, None] * (t[inside] - start)))
             motion[inside] = history.T @ p.contact_factor
             state = modes @ (amplitude * np.exp(rates * segment.length))
-        periodic = motion * np.exp(-np.log(mu) * t)[:, None]
-        spectrum = (np.abs(np.fft.fft(periodic, axis=0)) ** 2).sum(axis=1)
-        k = np.fft.fftfreq(samples, 1 / samples)[np.argmax(spectrum)]
-        return float(abs(np.angle(mu) / (2 * np.pi) + k) * p.speed_hz)
+        return motion
 
     def _rates(self) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients of free motion and of contact, per revolution, shape (2n, 2n) each."""

@@ -1,4 +1,4 @@
-"""Where the blade touches the casing: which tip nodes, how strongly, and over which arcs."""
+"""Where the blade touches the casing: which tip nodes, how strongly, and where round it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sdm_core.errors import InvalidInput
+from sdm_core.fourier_engagement import FourierEngagement
 from sdm_core.validation import WEIGHT_LIMIT, number
 
 Arc = tuple[float, float]
@@ -32,7 +33,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class ContactConfiguration:
-    """Weights of the contact nodes and arcs of engagement γ(θ) (DESIGN, sections 1 and 5).
+    """Weights of the contact nodes and engagement γ(θ), by arcs or smooth (DESIGN, sections 1 and 5).
 
     Parameters
     ----------
@@ -42,12 +43,14 @@ class ContactConfiguration:
     arcs
         Arcs of contact round the casing as (start, end) in revolutions, 0 ≤ start < 1,
         start < end ≤ start + 1, sorted and not overlapping; an arc may run past 1.
-        None is permanent contact.
+        None is permanent contact, where there is no `engagement` either.
+    engagement
+        Smooth γ(θ); arcs are left out then.
 
     Raises
     ------
     InvalidInput
-        For unusable weights or arcs, naming field, value and remedy.
+        For unusable weights, arcs or engagement, naming field, value and remedy.
 
     Examples
     --------
@@ -59,24 +62,50 @@ class ContactConfiguration:
 
     weights: Mapping[str, float]
     arcs: tuple[Arc, ...] | None = None
+    engagement: FourierEngagement | None = None
 
-    def __init__(self, weights: Mapping[str, float], arcs: Sequence[Sequence[float]] | None = None) -> None:
+    def __init__(
+        self,
+        weights: Mapping[str, float],
+        arcs: Sequence[Sequence[float]] | None = None,
+        engagement: FourierEngagement | None = None,
+    ) -> None:
         object.__setattr__(self, "weights", _checked_weights(weights))
         object.__setattr__(self, "arcs", None if arcs is None else _checked_arcs(arcs))
+        if arcs is not None and engagement is not None:
+            raise InvalidInput(
+                "contact.engagement", engagement.to_dict(), "give either arcs or engagement, not both"
+            )
+        object.__setattr__(self, "engagement", engagement)
 
     @classmethod
-    def at(cls, *nodes: str, arcs: Sequence[Sequence[float]] | None = None) -> ContactConfiguration:
+    def at(
+        cls,
+        *nodes: str,
+        arcs: Sequence[Sequence[float]] | None = None,
+        engagement: FourierEngagement | None = None,
+    ) -> ContactConfiguration:
         """Unit weight on each of the named nodes."""
-        return cls(dict.fromkeys(nodes, 1.0), arcs)
+        return cls(dict.fromkeys(nodes, 1.0), arcs, engagement)
 
     @property
     def permanent(self) -> bool:
         """True when γ = 1 all round the casing."""
-        return all(s.engaged for s in self.segments)
+        return not self.smooth and all(s.engaged for s in self.segments)
+
+    @property
+    def smooth(self) -> bool:
+        """True when γ varies smoothly, or is constant and not 1."""
+        return self.engagement is not None and not self.engagement.is_one
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """One revolution in order, from the start of the first arc; lengths add up to 1."""
+        """One revolution in order, from the start of the first arc; lengths add up to 1.
+
+        None of them where γ is smooth.
+        """
+        if self.smooth:
+            return ()
         if self.arcs is None:
             return (Segment(1.0, True),)
         pieces: list[Segment] = []
@@ -89,7 +118,9 @@ class ContactConfiguration:
 
     @property
     def engaged_fraction(self) -> float:
-        """Share of the circumference in contact."""
+        """Share of the circumference in contact: the mean of γ."""
+        if self.engagement is not None:
+            return self.engagement.mean
         return sum(s.length for s in self.segments if s.engaged)
 
     def weight_vector(self, tip_nodes: Sequence[str]) -> np.ndarray:
@@ -114,6 +145,8 @@ class ContactConfiguration:
         out: dict[str, Any] = {"weights": dict(self.weights)}
         if self.arcs is not None:
             out["arcs"] = [list(a) for a in self.arcs]
+        if self.engagement is not None:
+            out["engagement"] = self.engagement.to_dict()
         return out
 
     @classmethod
@@ -122,11 +155,15 @@ class ContactConfiguration:
         if not isinstance(data, Mapping):
             raise InvalidInput("contact", data, 'give an object such as {"weights": {"LE": 1.0}}')
         for key in data:
-            if key not in ("weights", "arcs"):
-                raise InvalidInput(f"contact.{key}", data[key], "leave it out: weights and arcs only")
+            if key not in ("weights", "arcs", "engagement"):
+                raise InvalidInput(
+                    f"contact.{key}", data[key], "leave it out: weights, arcs and engagement only"
+                )
         if "weights" not in data:
             raise InvalidInput("contact.weights", "missing", 'give weights, e.g. {"LE": 1.0}')
-        return cls(data["weights"], data.get("arcs"))
+        smooth = data.get("engagement")
+        engagement = None if smooth is None else FourierEngagement.from_dict(smooth)
+        return cls(data["weights"], data.get("arcs"), engagement)
 
 
 def _checked_weights(weights: Any) -> dict[str, float]:

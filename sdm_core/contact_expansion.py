@@ -8,7 +8,7 @@ from math import factorial
 
 import numpy as np
 
-from sdm_core.arc_propagation import ArcPropagation
+from sdm_core.propagation import Propagation
 
 _TERMS = np.array([6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
 FEWEST_TERMS, MOST_TERMS = int(_TERMS[0]), int(_TERMS[-1])
@@ -35,7 +35,7 @@ class ContactExpansion:
     size
         Largest entry of M on the rim, shape (b,): entries inside carry rounding errors of ε times it.
     noise
-        Rounding of those entries, relative to the largest, shape (b,).
+        Rounding of those entries, and what `motion` misses, relative to the largest, shape (b,).
     resolved
         False where the series had not fallen to rounding within `MOST_TERMS`, shape (b,).
     """
@@ -48,7 +48,7 @@ class ContactExpansion:
     resolved: np.ndarray
 
     @classmethod
-    def of(cls, motion: ArcPropagation, ke: np.ndarray, reach: np.ndarray) -> ContactExpansion:
+    def of(cls, motion: Propagation, ke: np.ndarray, reach: np.ndarray) -> ContactExpansion:
         """About −K_e each, for multipliers down to 1/reach.
 
         Parameters
@@ -63,11 +63,11 @@ class ContactExpansion:
         coefficients = np.zeros((count, FEWEST_TERMS, d, d))
         size, resolved = np.full(count, np.inf), np.zeros(count, dtype=bool)
         shift = motion.phase_shift * radius
-        noise = np.finfo(float).eps * (1 + motion.angle.max(axis=1))
         todo = np.arange(count)
         level = np.minimum(np.searchsorted(_SHIFT_HELD, shift), len(_TERMS) - 1)
         while len(todo):
             for now, m, found, largest in _series(motion, todo, centre, radius, _TERMS[level[todo]]):
+                noise = motion.rounding  # of smooth engagement known only now
                 tail = np.abs(found[:, -max(2, m // 8) :]).max(axis=(1, 2, 3))
                 done = (tail <= np.maximum(_NEGLIGIBLE, 2 * noise[now]) * largest) & np.isfinite(largest)
                 if m > coefficients.shape[1]:
@@ -78,7 +78,7 @@ class ContactExpansion:
                 size[now], resolved[now[done]] = largest, True
             level[todo] += 1
             todo = todo[~resolved[todo] & (level[todo] < len(_TERMS))]
-        return cls(centre, radius, coefficients, size, noise, resolved)
+        return cls(centre, radius, coefficients, size, motion.rounding, resolved)
 
     def __getitem__(self, rows: np.ndarray) -> ContactExpansion:
         return ContactExpansion(
@@ -120,7 +120,7 @@ class ContactExpansion:
 
 
 def _series(
-    motion: ArcPropagation, rows: np.ndarray, centre: np.ndarray, radius: np.ndarray, terms: np.ndarray
+    motion: Propagation, rows: np.ndarray, centre: np.ndarray, radius: np.ndarray, terms: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
     """Rows with equally many terms: coefficients (k, terms, d, d), largest entry on the rim (k,).
 

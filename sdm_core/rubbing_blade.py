@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from sdm_core.blade import Blade
-from sdm_core.contact import ContactConfiguration, Segment
-from sdm_core.delay_equation import DelayEquation, Engagement
+from sdm_core.contact import Arc, ContactConfiguration, Segment
+from sdm_core.delay_equation import DelayEquation, Engagement, Modulation
 from sdm_core.errors import InvalidInput
+from sdm_core.fourier_engagement import FourierEngagement
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 
 LEAST_DAMPING = 1e-8
@@ -34,9 +35,11 @@ class RubbingBlade:
     ke
         K_e, N/m.
     arcs
-        Arcs of engagement, or None for permanent contact.
+        Arcs of engagement, or None for permanent contact and smooth γ.
     segments
-        One revolution as stretches of constant γ.
+        One revolution as stretches of constant γ; none where γ is smooth.
+    engagement
+        Smooth γ, or None.
     """
 
     omega: np.ndarray
@@ -46,6 +49,7 @@ class RubbingBlade:
     ke: float
     arcs: tuple[tuple[float, float], ...] | None
     segments: tuple[Segment, ...]
+    engagement: FourierEngagement | None = None
 
     @classmethod
     def from_blade(
@@ -82,11 +86,10 @@ class RubbingBlade:
             number(f"speed_hz[{i}]", speed, *SPEED_LIMITS_HZ, "Hz")
         root = np.sqrt(contact.weight_vector(blade.tip_nodes))
         omega, shape = blade.at_speeds(speed_hz, extrapolate=extrapolate)
-        arcs = None if contact.permanent else contact.arcs
-        segments = contact.segments if arcs else (Segment(1.0, True),)
+        arcs, segments, engagement = _pattern(contact)
         damping = np.maximum(blade.damping_ratio, LEAST_DAMPING)
         return [
-            cls(w, damping, root[:, None] * v.T, float(s), 0.0, arcs, segments)
+            cls(w, damping, root[:, None] * v.T, float(s), 0.0, arcs, segments, engagement)
             for s, w, v in zip(speed_hz, omega, shape, strict=True)
         ]
 
@@ -97,7 +100,7 @@ class RubbingBlade:
     @property
     def permanent(self) -> bool:
         """True when γ = 1 all round."""
-        return self.arcs is None
+        return self.arcs is None and self.engagement is None
 
     @property
     def tau(self) -> float:
@@ -119,15 +122,28 @@ class RubbingBlade:
     def delay_equation(self) -> DelayEquation:
         """In state space zᵀ = (xᵀ ẋᵀ) ([SBL] Eqs. 5 and 20)."""
         n = len(self.omega)
-        engagement = None if self.arcs is None else Engagement(self.arcs, self.tau)
+        modulation: Modulation | None = None
+        if self.engagement is not None:
+            modulation = self.engagement.modulation(self.tau)
+        elif self.arcs is not None:
+            modulation = Engagement(self.arcs, self.tau)
         return DelayEquation.of_second_order(
             np.eye(n),
             np.diag(2 * self.damping_ratio * self.omega),
             np.diag(self.omega**2),
             self.ke * self.contact_matrix,
             self.tau,
-            engagement,
+            modulation,
         )
+
+
+def _pattern(
+    contact: ContactConfiguration,
+) -> tuple[tuple[Arc, ...] | None, tuple[Segment, ...], FourierEngagement | None]:
+    """Arcs, segments and smooth γ of a problem."""
+    if contact.permanent:
+        return None, (Segment(1.0, True),), None
+    return contact.arcs, contact.segments, contact.engagement
 
 
 def single_state_problem(
@@ -138,6 +154,7 @@ def single_state_problem(
     speed_hz: float,
     ke: float,
     arcs: list[list[float]] | None = None,
+    engagement: FourierEngagement | None = None,
 ) -> RubbingBlade:
     """A problem from bare arrays (frequencies (n,), damping (n,), mode shape (n, r), weights (r,)).
 
@@ -149,13 +166,12 @@ def single_state_problem(
     shape = np.asarray(mode_shape, dtype=float)
     if shape.shape != (len(frequency_hz), len(weights)):
         raise InvalidInput("mode_shape", f"shape {shape.shape}", "give one row a mode, one column a node")
-    contact = ContactConfiguration({"all": 1.0}, arcs)
+    contact = ContactConfiguration({"all": 1.0}, arcs, engagement)
     return RubbingBlade(
         2 * np.pi * np.asarray(frequency_hz, dtype=float),
         np.asarray(damping_ratio, dtype=float),
         np.sqrt(np.asarray(weights, dtype=float))[:, None] * shape.T,
         float(speed_hz),
         float(ke),
-        None if contact.permanent else contact.arcs,
-        contact.segments,
+        *_pattern(contact),
     )

@@ -177,7 +177,7 @@ def multiplier_sensitivity(problem: RubbingBlade, multiplier: complex) -> Multip
     Raises
     ------
     InvalidInput
-        When there is no multiplier near.
+        When there is no multiplier near, or the engagement is smooth: then no segments have constant γ.
 
     Examples
     --------
@@ -188,6 +188,10 @@ def multiplier_sensitivity(problem: RubbingBlade, multiplier: complex) -> Multip
     >>> bool(found.growth.damping_ratio[0] < 0)
     True
     """
+    if not problem.segments:
+        raise InvalidInput(
+            "contact.engagement", "smooth", "give arcs, or neither: derivatives need constant γ"
+        )
     mu = _checked_multiplier(multiplier)
     pencil = _Pencil.at(problem, mu)
     for _ in range(_MOST_STEPS):

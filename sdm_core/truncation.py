@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.arc_propagation import ArcPropagation
 from sdm_core.closed_form import Crossings
 from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.propagation import propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.validation import KE_LIMIT
 
@@ -75,7 +75,7 @@ def modes_enough(problem: RubbingBlade, ke_max: float) -> tuple[float, tuple[str
         return np.nan, ()
     ke_max = min(ke_max, KE_LIMIT)
     if not problem.permanent:  # the first crossing lies far below such growth, which takes long to follow
-        growth = float(ArcPropagation.of([problem]).phase_shift[0])
+        growth = float(propagation_of([problem]).phase_shift[0])
         ke_max = min(ke_max, _STRONGEST / max(growth, 1e-300))
     crossings = crossings_of([problem], ke_max)
     change = change_of_critical_ke([problem], ke_max, crossings)

@@ -246,7 +246,8 @@ class Screener:
         cases = CaseBatch.from_blade(blade, contact, speed)
         why = self.model.design_space.first_violation(cases)
         if not contact.permanent:
-            why[why == ""] = "arcs of contact, which this model does not cover"
+            pattern = "smooth engagement" if contact.smooth else "arcs of contact"
+            why[why == ""] = f"{pattern}, which this model does not cover"
         outside = why != ""
         if policy == "surrogate" and outside.any():
             i = int(np.argmax(outside))

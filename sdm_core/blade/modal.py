@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sdm_core.blade.tracking import tracked
+from sdm_core.blade.tracking import rising_modes, tracked
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, SPEED_LIMITS_HZ, matrix, number, vector
 
@@ -133,8 +133,11 @@ class Blade:
         if direction not in DIRECTIONS:
             raise InvalidInput("direction", direction, f"give one of {', '.join(DIRECTIONS)}")
         put(self, "direction", direction)
-        put(self, "states", _ordered_states(states, len(self.tip_nodes)))
-        put(self, "damping_ratio", _damping(damping_ratio, self.mode_count))
+        in_order = _ordered_states(states, len(self.tip_nodes))
+        put(self, "states", tracked(in_order))
+        damping = _damping(damping_ratio, self.mode_count)[rising_modes(in_order[0])]
+        damping.setflags(write=False)
+        put(self, "damping_ratio", damping)
         put(self, "design_speed_hz", design_speed_hz)
         if design_speed_hz is not None:
             number("design_speed_hz", design_speed_hz, *SPEED_LIMITS_HZ, "Hz")
@@ -285,7 +288,6 @@ def _damping(values: Any, modes: int) -> np.ndarray:
             raise InvalidInput(
                 "damping_ratio", f"{len(damping)} numbers", f"give one number, or one a mode: {modes}"
             )
-    damping.setflags(write=False)
     return damping
 
 
@@ -310,4 +312,4 @@ def _ordered_states(states: Any, nodes: int) -> tuple[ModalState, ...]:
     for before, after in pairwise(in_order):
         if after.speed_hz - before.speed_hz <= 1e-9 * after.speed_hz:
             raise InvalidInput("states", f"two at {after.speed_hz:g} Hz", "give one state a rotor speed")
-    return tracked(in_order)
+    return tuple(in_order)

@@ -19,8 +19,13 @@ LARGEST_SHAPE_CHANGE = 0.35
 LEAST_MARGIN = 0.02
 
 
+def rising_modes(state: ModalState) -> np.ndarray:
+    """Indices of the modes by rising frequency: the order of a blade's modes, shape (n,)."""
+    return np.argsort(state.frequency_hz, kind="stable")
+
+
 def tracked(states: Sequence[ModalState]) -> tuple[ModalState, ...]:
-    """States (sorted by speed) with modes in the order of the first one and signs aligned.
+    """States (sorted by speed), modes by rising frequency in the first one and signs aligned.
 
     Modes are paired by the shape of their amplitudes at the tip, in every direction given, and by
     frequency: two modes whose tip shapes look alike (a first and a second flap seen by one row of
@@ -32,7 +37,7 @@ def tracked(states: Sequence[ModalState]) -> tuple[ModalState, ...]:
         Naming the modes and the two speeds, when shapes change too much or two pairings are
         equally good.
     """
-    rising = np.argsort(states[0].frequency_hz, kind="stable")
+    rising = rising_modes(states[0])
     done = [states[0].reordered(rising, np.ones(len(rising)))]
     for state in states[1:]:
         order, sign = _pairing(done[-1], state)

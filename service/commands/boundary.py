@@ -9,6 +9,7 @@ import typer
 from service.commands.options import (
     ArcsOption,
     BladeArgument,
+    EngagementOption,
     JsonOption,
     KeMaxOption,
     LinerOption,
@@ -40,6 +41,7 @@ def run(
     nodes: NodesOption = None,
     weights: WeightsOption = None,
     arcs: ArcsOption = None,
+    engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
     url: UrlOption = None,
     models: ModelsOption = None,
@@ -76,7 +78,7 @@ def run(
 
     check_writable(inputs=[blade], json=json, png=png)
     chosen = blade_from(blade)
-    contact = contact_from(nodes, weights, arcs, chosen)
+    contact = contact_from(nodes, weights, arcs, engagement, chosen)
     low, high = speeds_from(speed, chosen)
     check_stiffnesses(ke_max, ke_liner)
     even = evenly_spaced(low, high, 200 if count is None else speed_count(count))

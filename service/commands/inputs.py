@@ -11,6 +11,7 @@ import numpy as np
 from sdm_core.blade import EXAMPLES, Blade, example_blade, read_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
+from sdm_core.fourier_engagement import FourierEngagement
 from sdm_core.validation import KE_LIMIT, number
 from service.speeds import SpeedRange, evenly_spaced, operating_range
 
@@ -30,7 +31,7 @@ def blade_from(text: str) -> Blade:
 
 
 def contact_from(
-    nodes: str | None, weights: str | None, arcs: str | None, blade: Blade
+    nodes: str | None, weights: str | None, arcs: str | None, engagement: str | None, blade: Blade
 ) -> ContactConfiguration:
     """The contact as typed; without nodes or weights, the leading edge."""
     if nodes is not None and weights is not None:
@@ -43,21 +44,32 @@ def contact_from(
             if not name or names.count(name) > 1:
                 raise InvalidInput("--nodes", str(nodes), "name each tip node once, e.g. LE,TE")
         chosen = dict.fromkeys(names, 1.0)
-    contact = ContactConfiguration(chosen, None if arcs is None else _arcs(arcs))
+    if arcs is not None and engagement is not None:
+        raise InvalidInput("--engagement", engagement, "give either --arcs or --engagement, not both")
+    contact = ContactConfiguration(
+        chosen,
+        None if arcs is None else _arcs(arcs),
+        None if engagement is None else _engagement(engagement),
+    )
     contact.weight_vector(blade.tip_nodes)
     return contact
 
 
 def contacts_from(
-    nodes: Sequence[str], weights: Sequence[str], arcs: str | None, blades: Sequence[Blade]
+    nodes: Sequence[str],
+    weights: Sequence[str],
+    arcs: str | None,
+    engagement: str | None,
+    blades: Sequence[Blade],
 ) -> dict[str, ContactConfiguration] | None:
     """One contact for each --nodes and --weights, by what was typed; None for the usual three."""
     if not nodes and not weights:
-        if arcs is not None:
-            raise InvalidInput("--arcs", arcs, "say which nodes too, e.g. --nodes LE --nodes TE")
+        for option, given in (("--arcs", arcs), ("--engagement", engagement)):
+            if given is not None:
+                raise InvalidInput(option, given, "say which nodes too, e.g. --nodes LE --nodes TE")
         return None
-    named = {text: contact_from(text, None, arcs, blades[0]) for text in nodes}
-    named.update({text: contact_from(None, text, arcs, blades[0]) for text in weights})
+    named = {text: contact_from(text, None, arcs, engagement, blades[0]) for text in nodes}
+    named.update({text: contact_from(None, text, arcs, engagement, blades[0]) for text in weights})
     return named
 
 
@@ -169,6 +181,14 @@ def _arcs(text: str) -> list[tuple[float, float]]:
             raise InvalidInput("--arcs", text, "give START:END in revolutions, e.g. 0:0.25,0.5:0.75")
         arcs.append((_number("--arcs", ends[0], text), _number("--arcs", ends[1], text)))
     return arcs
+
+
+def _engagement(text: str) -> FourierEngagement:
+    mean, *series = text.split(":")
+    if len(series) > 2:
+        raise InvalidInput("--engagement", text, "give MEAN, MEAN:COS,... or MEAN:COS,...:SIN,...")
+    rows = [[_number("--engagement", c, text) for c in part.split(",")] if part else [] for part in series]
+    return FourierEngagement(_number("--engagement", mean, text), *rows)
 
 
 def _number(field: str, part: str, text: str) -> float:

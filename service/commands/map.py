@@ -9,6 +9,7 @@ import typer
 from service.commands.options import (
     ArcsOption,
     BladeArgument,
+    EngagementOption,
     JsonOption,
     KeMaxOption,
     LinerOption,
@@ -33,13 +34,15 @@ def run(
         str | None,
         typer.Option(
             metavar="SPEEDSxSTIFFNESSES",
-            help="Points of the map. Left out: 200x200, or 50x50 with arcs, which the exact core answers.",
+            help="Points of the map. Left out: 200x200, or 50x50 with arcs or an engagement, "
+            "which the exact core answers.",
             show_default=False,
         ),
     ] = None,
     nodes: NodesOption = None,
     weights: WeightsOption = None,
     arcs: ArcsOption = None,
+    engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
     url: UrlOption = None,
     models: ModelsOption = None,
@@ -75,7 +78,7 @@ def run(
 
     check_writable(inputs=[blade], json=json, npz=npz, png=png)
     chosen = blade_from(blade)
-    contact = contact_from(nodes, weights, arcs, chosen)
+    contact = contact_from(nodes, weights, arcs, engagement, chosen)
     low, high = speeds_from(speed, chosen)
     shape = grid_from(grid or ("200x200" if contact.permanent else "50x50"))
     check_stiffnesses(ke_max, ke_liner)

@@ -62,6 +62,16 @@ ArcsOption = Annotated[
         show_default=False,
     ),
 ]
+EngagementOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MEAN[:COS,...[:SIN,...]]",
+        help="Smooth engagement round the casing instead of arcs, as Fourier coefficients from one cycle a "
+        "revolution up: 0.5:0.4,0.1 or 0.5::0.4. Within 0 to 1.",
+        rich_help_panel=CONTACT,
+        show_default=False,
+    ),
+]
 KeMaxOption = Annotated[float, typer.Option(metavar="N/m", help="Largest cutting stiffness K_e looked at.")]
 LinerOption = Annotated[
     float | None,

@@ -10,6 +10,7 @@ from service.commands.options import (
     CONTACT,
     OUTPUT,
     ArcsOption,
+    EngagementOption,
     JsonOption,
     KeMaxOption,
     LinerOption,
@@ -37,7 +38,7 @@ def run(
         str | None,
         typer.Option(
             metavar="SPEEDSxSTIFFNESSES",
-            help="Points of each map. Left out: 100x100, or 50x50 with arcs.",
+            help="Points of each map. Left out: 100x100, or 50x50 with arcs or an engagement.",
             show_default=False,
         ),
     ] = None,
@@ -60,6 +61,7 @@ def run(
         ),
     ] = None,
     arcs: ArcsOption = None,
+    engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
     url: UrlOption = None,
     models: ModelsOption = None,
@@ -94,7 +96,7 @@ def run(
     report_path = None if out is None else f"{out}/report.json"
     check_writable(inputs=blades, json=json, out=report_path)
     chosen = [blade_from(text) for text in blades]
-    contacts = contacts_from(nodes or (), weights or (), arcs, chosen)
+    contacts = contacts_from(nodes or (), weights or (), arcs, engagement, chosen)
     speed_range = None if speed is None else SpeedRange.parse(speed, "--speed")
     shape = None if grid is None else grid_from(grid)
     check_stiffnesses(ke_max, ke_liner)

@@ -11,6 +11,7 @@ import numpy as np
 
 from sdm_core.blade import SCHEMA, Blade, ModalState, blade_to_dict, example_blade
 from sdm_core.contact import ContactConfiguration
+from sdm_core.fourier_engagement import MOST_HARMONICS
 from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, KE_LIMIT, SPEED_LIMITS_HZ, WEIGHT_LIMIT
 from training.answers import POLICIES
 
@@ -70,6 +71,24 @@ BLADE: Json = {
         "material": {"type": "object"},
     },
 }
+_COEFFICIENTS: Json = {
+    "type": "array",
+    "maxItems": MOST_HARMONICS,
+    "items": {"type": "number", "minimum": -1, "maximum": 1},
+}
+ENGAGEMENT: Json = {
+    "type": "object",
+    "description": "Smooth engagement round the casing, instead of arcs: mean + sum over k of "
+    "cosine[k-1] cos(2 pi k theta) + sine[k-1] sin(2 pi k theta), theta in revolutions, within [0, 1]. It "
+    "is the share of K_e that cuts there.",
+    "required": ["mean"],
+    "additionalProperties": False,
+    "properties": {
+        "mean": {"type": "number", "exclusiveMinimum": 0, "maximum": 1},
+        "cosine": {**_COEFFICIENTS, "description": "Left out: zeros."},
+        "sine": {**_COEFFICIENTS, "description": "As many as cosine. Left out: zeros."},
+    },
+}
 CONTACT: Json = {
     "type": "object",
     "description": "Which tip nodes touch the casing, and where round it.",
@@ -87,6 +106,7 @@ CONTACT: Json = {
             "description": "Arcs of contact as [start, end] in revolutions, sorted, not overlapping; "
             "an end may run past 1. Left out: permanent contact.",
         },
+        "engagement": {"oneOf": [ENGAGEMENT, {"type": "null"}]},
     },
 }
 KE_MAX: Json = {

@@ -170,8 +170,13 @@ def described(contact: ContactConfiguration) -> str:
         where = f"contact at {len(touching)} nodes"
     else:
         where = "contact at " + " and ".join(n if w == 1 else f"{n} (× {w:g})" for n, w in touching.items())
-    if contact.arcs is None or contact.permanent:
+    if contact.permanent:
         return f"permanent {where}"
+    if contact.engagement is not None:
+        low, high = contact.engagement.extremes
+        span = f"{low:.0%}" if contact.engagement.harmonics == 0 else f"{low:.0%} to {high:.0%}"
+        return f"{where}, engaged by {span} round the casing"
+    assert contact.arcs is not None
     if len(contact.arcs) > 3:
         return f"{where}, {len(contact.arcs)} arcs, {contact.engaged_fraction:.0%} of the turn"
     return f"{where}, arcs " + ", ".join(f"{a:.3g}–{b:.3g}" for a, b in contact.arcs)

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from sdm_core.contact import ContactConfiguration
+from sdm_core.fourier_engagement import FourierEngagement
 from service.screening import charts
 from service.screening.charts import boundaries_png, described, map_png, ranking_png
 from service.screening.screen import screen
@@ -116,6 +117,15 @@ def test_no_chart_touches_the_global_state_of_matplotlib(blade, lobes):
             ContactConfiguration.at("LE", arcs=[(i / 5, i / 5 + 0.1) for i in range(5)]),
             "contact at LE, 5 arcs, 50% of the turn",
         ),
+        (
+            ContactConfiguration.at("LE", engagement=FourierEngagement(0.5, [0.4])),
+            "contact at LE, engaged by 10% to 90% round the casing",
+        ),
+        (
+            ContactConfiguration.at("LE", engagement=FourierEngagement(0.5)),
+            "contact at LE, engaged by 50% round the casing",
+        ),
+        (ContactConfiguration.at("LE", engagement=FourierEngagement(1.0)), "permanent contact at LE"),
     ],
 )
 def test_a_contact_is_put_in_words(contact, words):

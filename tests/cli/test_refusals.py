@@ -54,6 +54,11 @@ def assert_refused(result, field: str, value: str, remedy: str) -> None:
         (["--arcs", "0.5:0.25"], "contact.arcs[0][1]", "0.25", "0.5"),
         (["--arcs", "nan:0.5"], "contact.arcs[0][0]", "nan", "finite"),
         (["--arcs", "0.5"], "--arcs", "0.5", "START:END"),
+        (["--engagement", "0.3:0.4"], "contact.engagement", "down to -0.1", "γ ≥ 0"),
+        (["--engagement", "half"], "--engagement", "half", "number"),
+        (["--engagement", "0.5:0.1:0.1:0.1"], "--engagement", "0.5:0.1", "MEAN"),
+        (["--engagement", "0.5:0.1:0.1,0.1"], "contact.engagement.sine", "2 numbers", "give 1"),
+        (["--engagement", "0.5", "--arcs", "0:0.5"], "--engagement", "0.5", "not both"),
     ],
 )
 @pytest.mark.parametrize("command", ["map", "boundary"])
@@ -72,6 +77,8 @@ def test_an_unusable_number_of_speeds_is_refused(rubscreen):
 
 def test_arcs_without_nodes_are_refused_in_a_screening(rubscreen):
     assert_refused(rubscreen("screen", ROTOR, "--arcs", "0:0.5"), "--arcs", "0:0.5", "--nodes")
+    refused = rubscreen("screen", ROTOR, "--engagement", "0.5:0.4")
+    assert_refused(refused, "--engagement", "0.5:0.4", "--nodes")
 
 
 def blade_file(tmp_path, text: str, name: str = "blade.json") -> str:

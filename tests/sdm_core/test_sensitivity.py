@@ -480,6 +480,13 @@ def test_what_is_no_multiplier_is_refused(multiplier, remedy):
     assert refused.value.field == "multiplier"
 
 
+def test_without_segments_of_constant_engagement_there_is_an_error_and_no_derivative():
+    smooth = replace(random_problem(np.random.default_rng(0)), segments=())
+    with pytest.raises(InvalidInput, match="give arcs") as refused:
+        multiplier_sensitivity(smooth, 1.0)
+    assert refused.value.field == "contact.engagement"
+
+
 def test_a_stiffness_that_is_not_critical_is_refused():
     problem = random_problem(np.random.default_rng(0))
     with pytest.raises(InvalidInput, match=r"give a critical one: here \|μ\| = ") as refused:

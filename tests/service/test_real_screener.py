@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from sdm_core.blade import Blade, ModalState, example_blade
 from sdm_core.boundary import boundary
 from sdm_core.contact import ContactConfiguration
+from sdm_core.fourier_engagement import FourierEngagement
 from service.app import create_app
 from service.client import Client
 from service.rest.question_schemas import POINTS_EXAMPLE
@@ -74,9 +75,13 @@ def test_critical_stiffness_over_http_is_two_xi_times_one_plus_xi(real):
     assert np.nanmin(found.critical_ke) >= CRITICAL * (1 - 1e-6)
 
 
-@pytest.mark.parametrize("arcs", [None, [(0.0, 0.25), (0.9, 0.95)]])
-def test_points_map_and_boundary_over_http_agree_with_the_core(real, arcs):
-    blade, contact = example_blade("nasa_rotor_37"), ContactConfiguration.at("LE", "TE", arcs=arcs)
+@pytest.mark.parametrize(
+    "pattern",
+    [{}, {"arcs": [(0.0, 0.25), (0.9, 0.95)]}, {"engagement": FourierEngagement(0.4, [0.3, 0.05])}],
+    ids=["permanent", "arcs", "smooth"],
+)
+def test_points_map_and_boundary_over_http_agree_with_the_core(real, pattern):
+    blade, contact = example_blade("nasa_rotor_37"), ContactConfiguration.at("LE", "TE", **pattern)
     speeds, ke = np.array([150.0, 220.0, 286.0]), np.array([500.0, 3000.0, 20000.0])
     core = boundary(blade, contact, speeds, 25000.0)
     with Client(str(real.base_url)) as client:

@@ -90,6 +90,20 @@ BAD_CONTACTS = {
     "an arc that ends before it starts": (["contact", "arcs"], [[0.5, 0.25]], "contact.arcs[0][1]", "0.25"),
     "an arc with one end": (["contact", "arcs"], [[0.5]], "contact.arcs[0]", "[0.5]"),
     "an arc of NaN": (["contact", "arcs"], [[NAN, 0.5]], "contact.arcs[0][0]", "nan"),
+    "engagement as a number": (["contact", "engagement"], 0.5, "contact.engagement", "0.5"),
+    "engagement without a mean": (["contact", "engagement"], {}, "contact.engagement.mean", "missing"),
+    "engagement below zero": (
+        ["contact", "engagement"],
+        {"mean": 0.3, "cosine": [0.4]},
+        "contact.engagement",
+        "γ down to -0.1",
+    ),
+    "an engagement of NaN": (
+        ["contact", "engagement"],
+        {"mean": 0.5, "sine": [NAN]},
+        "contact.engagement.sine[0]",
+        "nan",
+    ),
     "contact as text": (["contact"], "LE", "contact", "LE"),
     "no contact": (["contact"], DELETE, "contact", "missing"),
 }

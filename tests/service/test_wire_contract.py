@@ -91,10 +91,12 @@ def test_a_map_as_npz_holds_the_same_and_needs_no_pickle(http, question, form):
         assert (str(npz["model"]), str(npz["solver"])) == ("rule-1", "rule")
 
 
-@pytest.mark.parametrize("arcs", [None, [[0.0, 0.25]]])
-def test_a_map_as_png_is_a_picture(http, question, arcs):
+@pytest.mark.parametrize(
+    "contact", [{}, {"arcs": [[0.0, 0.25]]}, {"arcs": None, "engagement": {"mean": 0.5, "sine": [0.4]}}]
+)
+def test_a_map_as_png_is_a_picture(http, question, contact):
     body = question("/v1/map", ke=[0.0, 1e4, 2e4])
-    body["contact"]["arcs"] = arcs
+    body["contact"].update(contact)
     body["blade"]["name"] = "50 % span $\\frac{\n"
     answer = http.post("/v1/map", json=body, headers={"Accept": "image/png"})
     assert answer.status_code == 200, answer.text

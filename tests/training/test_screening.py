@@ -7,6 +7,7 @@ from sdm_core.blade import EXAMPLES, Blade, ModalState, example_blade
 from sdm_core.boundary import boundary, verdicts
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput, OutOfSpeedRange, TooMuchWork
+from sdm_core.fourier_engagement import FourierEngagement
 from training.answers import CONFIDENT, EXACT, NEAR_BOUNDARY, OUT_OF_DOMAIN, REQUESTED, SURROGATE
 from training.cases import CaseBatch
 from training.evaluation import evaluate
@@ -17,6 +18,7 @@ from training.screening import Screener
 
 LE = ContactConfiguration.at("LE")
 ARCS = ContactConfiguration({"LE": 1.0}, [[0.0, 0.25], [0.5, 0.75]])
+SMOOTH = ContactConfiguration.at("LE", engagement=FourierEngagement(0.5, [0.4]))
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +118,8 @@ def test_points_say_where_their_answer_comes_from(screener, rotor_37):
 def test_arcs_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
     arcs = screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]))
     assert (arcs.source[0], arcs.reason[0]) == (EXACT, OUT_OF_DOMAIN)
+    smooth = screener.points(rotor_37, SMOOTH, np.array([250.0]), np.array([1e3]))
+    assert (smooth.source[0], smooth.reason[0]) == (EXACT, OUT_OF_DOMAIN)
     slow = screener.boundary(rotor_37, LE, np.array([20.0]), 2.5e4)
     assert (slow.source[0], slow.reason[0]) == (EXACT, OUT_OF_DOMAIN)
     asked = screener.map(rotor_37, LE, np.array([250.0]), np.array([1e3]), policy="exact")
@@ -125,6 +129,8 @@ def test_arcs_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
 def test_the_surrogate_alone_refuses_what_lies_outside_its_domain(screener, rotor_37):
     with pytest.raises(InvalidInput, match="arcs of contact"):
         screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]), policy="surrogate")
+    with pytest.raises(InvalidInput, match="smooth engagement"):
+        screener.points(rotor_37, SMOOTH, np.array([250.0]), np.array([1e3]), policy="surrogate")
     with pytest.raises(InvalidInput, match=r"speed_hz\[1\] = 20 Hz: speed/f1 outside"):
         screener.boundary(rotor_37, LE, np.array([250.0, 20.0]), 2.5e4, policy="surrogate")
 
