@@ -78,9 +78,9 @@ def speed(problems: list[RubbingBlade]) -> dict[str, np.ndarray]:
     batch_multipliers(problems)
     out: dict[str, list[float]] = {"one": [], "all": [], "dense": []}
     for k in track(range(ROUNDS), "speed", transient=True):
-        for name, threads in (("one", 1), ("all", cores)):
+        for name, workers in (("one", 1), ("all", cores)):
             start = time.perf_counter()
-            batch_multipliers(problems, threads=threads)
+            batch_multipliers(problems, workers=workers)
             out[name].append((time.perf_counter() - start) / len(problems))
         start = time.perf_counter()
         part = problems[k::ROUNDS][:DENSE_A_ROUND]
@@ -116,8 +116,8 @@ def table() -> Group:
     for name in ("method", "ms a point", "times faster", "smallest", "largest"):
         fast.add_column(name, justify="right")
     names = {
-        "one": "batch, one thread",
-        "all": f"batch, {available_cores()} threads",
+        "one": "batch, one process",
+        "all": f"batch, {available_cores()} processes",
         "dense": "dense product",
     }
     for key, name in names.items():

@@ -54,10 +54,10 @@ def _over_speeds(
 
 
 METHODS: dict[str, tuple[bool, Work]] = {
-    "multipliers, arcs, a point": (True, lambda problems: batch_multipliers(problems, threads=1)),
+    "multipliers, arcs, a point": (True, lambda problems: batch_multipliers(problems, workers=1)),
     "boundary, arcs, a speed": (
         True,
-        lambda problems: _over_speeds(problems, lambda p, k: boundaries_with_arcs(p, k, threads=1)),
+        lambda problems: _over_speeds(problems, lambda p, k: boundaries_with_arcs(p, k, workers=1)),
     ),
     "boundary, permanent, a speed": (False, lambda problems: _over_speeds(problems, permanent_crossings)),
 }

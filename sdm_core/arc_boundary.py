@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from sdm_core.closed_form import Crossings
 from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.fredholm import leading_multipliers, slopes
 from sdm_core.interruption import checkpoint
-from sdm_core.parallel import available_cores, in_threads
+from sdm_core.parallel import available_cores, shared
 from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
@@ -28,7 +29,8 @@ _BAND = 4.0  # K_e over which one series serves, where contact is strong
 _WEAK = 1.0  # growth up to which one series serves down to zero
 _FOLLOWED = 0.4  # of |ln |μ||: branches that may reach the circle between two samples
 _MOST_ROUNDS = 60
-_POINTS, _SPEEDS = 800, 50  # solved together
+_POINTS, _SPEEDS = 800, 20  # solved together
+_WORTH_SHARING = 60  # speeds, for which it pays to start processes
 # Between neighbouring stiffnesses beyond the series: of growth by e^11 a revolution, and of any.
 _STRONG_RATIO, _STRONGEST_RATIO = 1.06, 2.0
 
@@ -59,7 +61,7 @@ def boundaries_with_arcs(
     ke_max: float,
     *,
     progress: Progress | None = None,
-    threads: int | None = None,
+    workers: int | None = None,
 ) -> list[Crossings]:
     """K_e up to `ke_max` at which each blade becomes unstable or stable again.
 
@@ -76,27 +78,33 @@ def boundaries_with_arcs(
         Each its own speed; their K_e is not used.
     ke_max
         N/m.
+    progress
+        Called with speeds solved and their number.
+    workers
+        Processes to share the work; None as in `batch_multipliers`.
     """
     out: list[Crossings] = [Crossings.none()] * len(problems)
     kinds = [kind(p) for p in problems]
-    threads = available_cores() if threads is None else threads
+    if workers is None:
+        workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
     parts = []
     for one in sorted(set(kinds)):
         rows = np.flatnonzero([k == one for k in kinds])
-        size = min(_SPEEDS, max(4, -(-len(rows) // threads)))
+        size = min(_SPEEDS, max(4, -(-len(rows) // workers)))
         parts += [rows[i : i + size] for i in range(0, len(rows), size)]
-
-    def solve(rows: np.ndarray) -> int:
-        for row, crossings in zip(rows, _Scan([problems[i] for i in rows], ke_max).crossings(), strict=True):
-            out[row] = crossings
-        return len(rows)
-
     finished = 0
-    for solved in in_threads(solve, parts, threads):
-        finished += solved
+    solve = partial(_crossings, ke_max=ke_max)
+    for i, found in shared(solve, [[problems[k] for k in rows] for rows in parts], workers):
+        for row, crossings in zip(parts[i], found, strict=True):
+            out[row] = crossings
+        finished += len(parts[i])
         if progress is not None:
             progress(finished, len(problems))
     return out
+
+
+def _crossings(problems: list[RubbingBlade], ke_max: float) -> list[Crossings]:
+    return _Scan(problems, ke_max).crossings()
 
 
 @dataclass
@@ -260,7 +268,7 @@ class _Scan:
         strong = np.flatnonzero((outside < 0) & ~followed)
         if len(strong):
             problems = [self.problems[case[k]].with_ke(float(ke[k])) for k in strong]
-            stable = batch_multipliers(problems, dominant=False, thorough=False, threads=1).stable
+            stable = batch_multipliers(problems, dominant=False, thorough=False, workers=1).stable
             outside[strong] = np.where(np.isnan(stable), -1, stable == 0.0)
         for k in np.flatnonzero((outside < 0) & followed):  # on the circle to rounding: a neighbour tells
             alone = CharacteristicEquation(self.problems[case[k]].with_ke(float(ke[k]) * (1 + 1e-7)))

@@ -19,7 +19,7 @@ _MOST_SQUARINGS = 60  # beyond, entries overflow long before
 
 def exponentials(a: np.ndarray) -> np.ndarray:
     """exp(a) of many small matrices, shape (k, d, d): Taylor series, scaling and squaring."""
-    return Exponentials.of(a).over(np.ones(len(a)))
+    return Exponentials.of(a, np.abs(a).sum(axis=2).max(axis=1)).over(np.ones(len(a)))
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Exponentials:
     Attributes
     ----------
     size
-        ‖a‖ (largest row sum), shape (k,).
+        ‖a‖ (largest row sum, or a bound on it), shape (k,).
     powers
         a/‖a‖ to the power 0 to 4, shape (5, k, d, d).
     """
@@ -41,8 +41,8 @@ class Exponentials:
     powers: np.ndarray
 
     @classmethod
-    def of(cls, a: np.ndarray) -> Exponentials:
-        size = np.abs(a).sum(axis=2).max(axis=1)
+    def of(cls, a: np.ndarray, size: np.ndarray) -> Exponentials:
+        """Of matrices a, shape (k, d, d), with a bound `size` on their row sums, shape (k,)."""
         powers = np.empty((5, *a.shape), dtype=a.dtype)
         powers[0] = np.eye(a.shape[-1])
         np.multiply(a, (1 / np.where(size > 0, size, 1.0))[:, None, None], out=powers[1])
@@ -188,7 +188,11 @@ class ArcPropagation:
         rate[:, n:, :n] += c[:, None, None] * self.coupling[case]
         out: np.ndarray | None = None
         with np.errstate(all="ignore"):  # where c is huge entries overflow: callers look at the result
-            exponential = Exponentials.of(rate)
+            # Rows of (0, angle) and of (c coupling − angle, −2ξ angle), without looking at every entry.
+            rows = (1 + 2 * self.damping_ratio) * self.angle
+            pull = np.abs(self.coupling).sum(axis=2)
+            size = (rows[case] + np.abs(c)[:, None] * pull[case]).max(axis=1)
+            exponential = Exponentials.of(rate, size)
             for s in range(self.arcs.shape[1]):
                 length = self.arcs[case, s]
                 has = np.flatnonzero(length > 0)  # some have fewer arcs than others

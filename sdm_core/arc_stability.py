@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
 from sdm_core.characteristic import CharacteristicEquation, count_outside
 from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.fredholm import LeadingMultipliers, leading_multipliers
-from sdm_core.parallel import available_cores, in_threads
+from sdm_core.parallel import available_cores, shared
 from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
@@ -20,6 +21,7 @@ _MODERATE, _MODERATE_EXPONENT = 60.0, 6.0
 _STRONG_EXPONENTS = (12.0, 9.0, 15.0, 18.0, 6.0, 10.5, 21.0, 13.5)
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
 _CHUNK, _FEWEST = 250, 50  # problems solved together
+_WORTH_SHARING = 2000  # problems, for which it pays to start processes
 
 Progress = Callable[[int, int], None]
 
@@ -50,6 +52,26 @@ class BatchMultipliers:
     leading: np.ndarray
     leading_error: np.ndarray
 
+    @classmethod
+    def unknown(cls, count: int, listed: int) -> BatchMultipliers:
+        """Of problems not solved yet."""
+        return cls(
+            np.zeros(count, dtype=complex),
+            np.full(count, np.inf),
+            np.full(count, -1),
+            np.zeros(count, dtype=bool),
+            np.zeros((count, listed), dtype=complex),
+            np.zeros((count, listed)),
+        )
+
+    def listed(self, at: np.ndarray, found: LeadingMultipliers, rows: np.ndarray) -> None:
+        """Take over multipliers found for the problems `at`."""
+        self.multiplier[at] = found.multiplier[rows, 0]
+        self.error_estimate[at] = found.error_estimate[rows, 0]
+        most = min(self.leading.shape[1], found.multiplier.shape[1])
+        self.leading[at, :most] = found.multiplier[rows, :most]
+        self.leading_error[at, :most] = found.error_estimate[rows, :most]
+
     @property
     def stable(self) -> np.ndarray:
         """1.0 stable, 0.0 unstable, NaN not decided; one multiplier outside is enough to be unstable."""
@@ -66,7 +88,7 @@ def batch_multipliers(
     thorough: bool = True,
     listed: int = 1,
     progress: Progress | None = None,
-    threads: int | None = None,
+    workers: int | None = None,
 ) -> BatchMultipliers:
     """Dominant multiplier and number of unstable ones of each problem.
 
@@ -83,51 +105,35 @@ def batch_multipliers(
     listed
         How many leading multipliers are made exact and given.
     progress
-        Called with problems solved and their number, in the calling thread.
-    threads
-        Threads to share the work; None takes all cores that this process may use.
+        Called with problems solved and their number.
+    workers
+        Processes to share the work. None takes all cores that this process may use where there are
+        problems enough to be worth it.
     """
-    b = len(problems)
-    out = BatchMultipliers(
-        np.zeros(b, dtype=complex),
-        np.full(b, np.inf),
-        np.full(b, -1),
-        np.zeros(b, dtype=bool),
-        np.zeros((b, listed), dtype=complex),
-        np.zeros((b, listed)),
-    )
+    out = BatchMultipliers.unknown(len(problems), listed)
+    if workers is None:
+        workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
     kinds = [kind(p) for p in problems]
-    threads = available_cores() if threads is None else threads
     parts = []
     for one in sorted(set(kinds)):
         members = np.flatnonzero([k == one for k in kinds])
-        size = min(_CHUNK, max(_FEWEST, -(-len(members) // threads)))
+        size = min(_CHUNK, max(_FEWEST, -(-len(members) // workers)))
         parts += [members[i : i + size] for i in range(0, len(members), size)]
+    solve = partial(_solve, dominant=dominant, thorough=thorough, listed=listed)
     finished = 0
-
-    def solve(rows: np.ndarray) -> int:
-        _solve([problems[k] for k in rows], rows, out, dominant, thorough)
-        return len(rows)
-
-    for solved in in_threads(solve, parts, threads):
-        finished += solved
+    for i, found in shared(solve, [[problems[k] for k in rows] for rows in parts], workers):
+        for f in fields(BatchMultipliers):
+            getattr(out, f.name)[parts[i]] = getattr(found, f.name)
+        finished += len(parts[i])
         if progress is not None:
-            progress(finished, b)
+            progress(finished, len(problems))
     return out
 
 
-def _list(out: BatchMultipliers, at: np.ndarray, found: LeadingMultipliers, rows: np.ndarray) -> None:
-    out.multiplier[at] = found.multiplier[rows, 0]
-    out.error_estimate[at] = found.error_estimate[rows, 0]
-    most = min(out.leading.shape[1], found.multiplier.shape[1])
-    out.leading[at, :most] = found.multiplier[rows, :most]
-    out.leading_error[at, :most] = found.error_estimate[rows, :most]
-
-
-def _solve(
-    problems: list[RubbingBlade], rows: np.ndarray, out: BatchMultipliers, dominant: bool, thorough: bool
-) -> None:
-    motion, listed = propagation_of(problems), out.leading.shape[1]
+def _solve(problems: list[RubbingBlade], *, dominant: bool, thorough: bool, listed: int) -> BatchMultipliers:
+    """Of problems of one kind with equally many modes."""
+    out = BatchMultipliers.unknown(len(problems), listed)
+    motion = propagation_of(problems)
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
@@ -144,19 +150,19 @@ def _solve(
         series = ContactExpansion.of(motion[todo], centre[todo], reach)
         found = leading_multipliers(series, ke[todo], polished=listed)
         decided = (found.outside >= 0) & ((found.multiplier[:, 0] != 0) | (not dominant))
-        at = rows[todo[decided]]
-        _list(out, at, found, decided)
+        at = todo[decided]
+        out.listed(at, found, decided)
         out.outside[at] = found.outside[decided]
         out.by_series[at] = True
         todo = todo[~decided]
-    rest = np.flatnonzero(~out.by_series[rows])
+    rest = np.flatnonzero(~out.by_series)
     if len(rest) == 0:
-        return
-    out.outside[rows[rest]] = count_outside(motion[rest], ke[rest])
+        return out
+    out.outside[rest] = count_outside(motion[rest], ke[rest])
     # Much contact: multipliers far outside the circle are found on a smaller disc, and prove instability
     # even where rounding hides the number of the others.
     wanted = growth[rest] * _REACHES[0] >= 1.0
-    strong = rest[wanted & (dominant | (out.outside[rows[rest]] < 0))]
+    strong = rest[wanted & (dominant | (out.outside[rest] < 0))]
     for exponent in (_MODERATE_EXPONENT, *_STRONG_EXPONENTS):
         if len(strong) == 0:
             break
@@ -165,12 +171,13 @@ def _solve(
         expansion = ContactExpansion.of(motion[strong], centre[strong], reach)
         found = leading_multipliers(expansion, ke[strong], polished=listed)
         far = found.resolved & (found.multiplier[:, 0] != 0)
-        _list(out, rows[strong[far]], found, far)
+        out.listed(strong[far], found, far)
         strong = strong[~far]
     for k in rest if thorough else ():
-        count, equation = int(out.outside[rows[k]]), CharacteristicEquation(problems[k])
-        if out.multiplier[rows[k]] != 0 or not (dominant or count < 0):
+        count, equation = int(out.outside[k]), CharacteristicEquation(problems[k])
+        if out.multiplier[k] != 0 or not (dominant or count < 0):
             continue
         found_one = equation.dominant(None if count < 0 else count) if dominant else equation.one_outside()
-        out.multiplier[rows[k]], out.error_estimate[rows[k]] = found_one
-        out.leading[rows[k], 0], out.leading_error[rows[k], 0] = found_one
+        out.multiplier[k], out.error_estimate[k] = found_one
+        out.leading[k, 0], out.leading_error[k, 0] = found_one
+    return out

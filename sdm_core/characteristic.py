@@ -13,6 +13,7 @@ from sdm_core.smooth_propagation import SmoothPropagation
 from sdm_core.winding import half_turns
 
 _LARGEST_GROWTH = 1e11  # of an entry of M: what is smaller than its rounding error no longer shows
+_AT_REST = 1e-10  # of the contact's displacement, relative to that of the modes
 _MOST_OSCILLATIONS = 200_000.0  # rad a revolution that the chatter frequency is looked for among
 
 
@@ -29,7 +30,7 @@ def first_points(motion: Propagation, ke: np.ndarray, radius: float = 1.0) -> np
     Contact adds a phase of up to K_e |1/μ − 1| × `phase_shift` over a revolution; those of all
     unstable multipliers together turn the determinant about as much.
     """
-    return 17 + np.minimum(1000.0, motion.phase_shift * ke * (1 + 1 / radius)).astype(int)
+    return 17 + np.minimum(1000.0, 0.5 * motion.phase_shift * ke * (1 + 1 / radius)).astype(int)
 
 
 def count_outside(motion: Propagation, ke: np.ndarray) -> np.ndarray:
@@ -199,6 +200,11 @@ class CharacteristicEquation:
             motion = self._motion.displacement(0, p.ke * (1 / mu - 1), state)
         else:
             motion = self._displacement(mu, state, 64 * int(np.ceil(max(8.0, fastest * p.tau / 8))))
+        if (
+            np.abs(motion).max()
+            < _AT_REST * np.abs(p.contact_factor).max() * np.abs(state[: len(p.omega)]).max()
+        ):
+            return float("nan")  # the mode does not move the contact: what is left is rounding
         samples = len(motion)
         periodic = motion * np.exp(-np.log(mu) * np.arange(samples) / samples)[:, None]
         spectrum = (np.abs(np.fft.fft(periodic, axis=0)) ** 2).sum(axis=1)

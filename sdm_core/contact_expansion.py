@@ -31,7 +31,9 @@ class ContactExpansion:
     centre, radius
         K and R K, N/m, shape (b,).
     coefficients
-        C_k, shape (b, terms, d, d).
+        C_k, shape (b, m, d, d), zero from each one's own number of terms on.
+    terms
+        That number, shape (b,).
     size
         Largest entry of M on the rim, shape (b,): entries inside carry rounding errors of ε times it.
     noise
@@ -43,6 +45,7 @@ class ContactExpansion:
     centre: np.ndarray
     radius: np.ndarray
     coefficients: np.ndarray
+    terms: np.ndarray
     size: np.ndarray
     noise: np.ndarray
     resolved: np.ndarray
@@ -62,6 +65,7 @@ class ContactExpansion:
         centre, radius = ke, reach * ke
         coefficients = np.zeros((count, FEWEST_TERMS, d, d))
         size, resolved = np.full(count, np.inf), np.zeros(count, dtype=bool)
+        terms = np.full(count, FEWEST_TERMS)
         shift = motion.phase_shift * radius
         todo = np.arange(count)
         level = np.minimum(np.searchsorted(_SHIFT_HELD, shift), len(_TERMS) - 1)
@@ -75,16 +79,19 @@ class ContactExpansion:
                     grown[:, : coefficients.shape[1]] = coefficients
                     coefficients = grown
                 coefficients[now[done], :m] = found[done]
+                terms[now[done]] = m
                 size[now], resolved[now[done]] = largest, True
             level[todo] += 1
             todo = todo[~resolved[todo] & (level[todo] < len(_TERMS))]
-        return cls(centre, radius, coefficients, size, motion.rounding, resolved)
+        return cls(centre, radius, coefficients, terms, size, motion.rounding, resolved)
 
     def __getitem__(self, rows: np.ndarray) -> ContactExpansion:
+        terms = self.terms[rows]
         return ContactExpansion(
             self.centre[rows],
             self.radius[rows],
-            self.coefficients[rows],
+            self.coefficients[rows, : terms.max(initial=FEWEST_TERMS)],
+            terms,
             self.size[rows],
             self.noise[rows],
             self.resolved[rows],

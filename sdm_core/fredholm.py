@@ -87,6 +87,7 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
     out = np.zeros((b, _SAMPLES[0]))
     resolved = np.zeros(b, dtype=bool)
     todo = np.flatnonzero(expansion.resolved)
+    todo = todo[np.argsort(expansion.terms[todo], kind="stable")]  # short series together are cheap
     one = np.eye(d)
     for samples in _SAMPLES:
         if len(todo) == 0:
@@ -96,7 +97,7 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
         half = samples // 2 + 1
         found = np.empty((len(todo), samples))
         size = np.empty(len(todo))
-        chunk = max(1, int(6e4 / (half * d * d)))
+        chunk = max(1, int(3e4 / (half * d * d)))
         for i in range(0, len(todo), chunk):
             checkpoint()
             rows = todo[i : i + chunk]

@@ -1,47 +1,69 @@
-"""Work shared by threads: array operations of numpy let other threads run meanwhile."""
+"""Work shared by processes: small array operations hold Python's lock, so threads would not help."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextvars import copy_context
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from typing import TypeVar
+
+from loky import get_reusable_executor
 
 from sdm_core.interruption import checkpoint
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
-_LONGEST_WAIT = 0.1  # s between checkpoints of the calling thread
+_LONGEST_WAIT = 0.1  # s between checkpoints of the calling process
+_IDLE_S = 60.0  # after which workers leave
+_IN_WORKER = "RUBSCREEN_WORKER"
+_ALONE = {_IN_WORKER: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Cores that this process may use; one in a worker."""
+    if _IN_WORKER in os.environ:
+        return 1
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Windows or macOS
         return os.cpu_count() or 1
 
 
-def in_threads(work: Callable[[Part], Result], parts: Sequence[Part], threads: int) -> Iterator[Result]:
-    """Results of each part as they come, in any order.
+def shared(
+    work: Callable[[Part], Result], parts: Sequence[Part], workers: int
+) -> Iterator[tuple[int, Result]]:
+    """(index, result) of each part as they come, in any order.
 
-    Threads see the caller's context, so that what stops the caller stops them. When one part
-    fails, or the caller gives up, parts not begun are dropped and the others waited for.
+    Worker processes start in about a second and stay for a minute. When the caller gives up (checkpoint)
+    or a part fails, parts not begun are dropped. When a worker dies, what is left is done here.
+
+    Parameters
+    ----------
+    work
+        A function at the top level of a module.
+    workers
+        1 works in this process.
     """
-    if threads <= 1 or len(parts) <= 1:
-        for part in parts:
-            checkpoint()
-            yield work(part)
-        return
-    with ThreadPoolExecutor(min(threads, len(parts)), "solve") as pool:
-        pending: set[Future[Result]] = {pool.submit(copy_context().run, work, part) for part in parts}
+    left = dict(enumerate(parts))
+    if workers > 1 and len(parts) > 1:
+        pool = get_reusable_executor(max_workers=workers, timeout=_IDLE_S, env=_ALONE)
+        pending: dict[Future[Result], int] = {}
         try:
+            pending = {pool.submit(work, part): i for i, part in left.items()}
             while pending:
-                done, pending = wait(pending, _LONGEST_WAIT, FIRST_COMPLETED)
+                done, _ = wait(pending, _LONGEST_WAIT, FIRST_COMPLETED)
                 checkpoint()
                 for future in done:
-                    yield future.result()
+                    i = pending.pop(future)
+                    result = future.result()
+                    del left[i]
+                    yield i, result
+        except BrokenExecutor:  # a worker was killed, say for memory
+            pass
         finally:
-            pool.shutdown(cancel_futures=True)
+            for future in pending:
+                future.cancel()
+    for i, part in list(left.items()):
+        checkpoint()
+        yield i, work(part)

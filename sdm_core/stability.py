@@ -54,7 +54,8 @@ class StabilitySolution:
         ``fold`` (real, above 0).
     chatter_hz
         |arg μ/2π + k| Ω, k the largest Fourier component of the contact displacement over a
-        revolution (DESIGN, section 1); NaN where the method does not resolve it.
+        revolution (DESIGN, section 1); NaN where the method does not resolve it, or the contact does
+        not move.
     wear_lobes
         Lobes that chatter would wear into the liner per revolution, chatter frequency over Ω.
     truncation_change
@@ -143,7 +144,7 @@ def stability(
 
 
 def stabilities(
-    problems: Sequence[RubbingBlade], *, progress: Progress | None = None, threads: int | None = None
+    problems: Sequence[RubbingBlade], *, progress: Progress | None = None, workers: int | None = None
 ) -> list[StabilitySolution]:
     """`stability` of many rubbing blades by the exact characteristic equation, solved together.
 
@@ -151,12 +152,12 @@ def stabilities(
 
     Parameters
     ----------
-    progress, threads
+    progress, workers
         As in `batch_multipliers`.
     """
     nothing: list[tuple[str, ...]] = [()] * len(problems)
     unknown = [np.nan] * len(problems)
-    return _exact(problems, time.perf_counter(), unknown, nothing, progress=progress, threads=threads)
+    return _exact(problems, time.perf_counter(), unknown, nothing, progress=progress, workers=workers)
 
 
 def _exact(

@@ -186,7 +186,7 @@ def test_progress_is_reported_and_a_batch_can_be_stopped():
             raise Cancelled("enough")
 
     with interruptible(stop), pytest.raises(Cancelled):
-        boundaries_with_arcs(problems, 0.01, threads=1)
+        boundaries_with_arcs(problems, 0.01, workers=1)
     assert passed == 10
 
 

@@ -246,7 +246,6 @@ def test_a_first_crossing_far_below_the_largest_stiffness_is_not_passed_over():
     assert far.critical_ke[0] == pytest.approx(near.critical_ke[0], rel=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason="the largest Fourier component of a contact at rest is rounding")
 @both_contacts
 def test_a_dominant_mode_that_does_not_move_the_contact_has_no_chatter_frequency(arcs):
     blade = blade_of([100.0, 150.0], [5e-3, 1e-3], [[2.0], [0.0]])

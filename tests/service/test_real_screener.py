@@ -128,8 +128,8 @@ def test_a_speed_the_modal_data_do_not_reach_is_refused(real, problem):
 def test_more_exact_work_than_one_call_may_ask_for_is_refused(real, problem):
     body = POINTS_EXAMPLE | {
         "contact": {"weights": {"LE": 1.0}, "arcs": [[0.0, 0.25]]},
-        "speed_hz": [100.0 + i / 100 for i in range(10_000)],
-        "ke": [1e4] * 10_000,
+        "speed_hz": [100.0 + i / 100 for i in range(20_000)],
+        "ke": [1e4] * 20_000,
         "policy": "exact",
     }
     problem(real.post("/v1/stability", json=body), 413, "speed_hz")
