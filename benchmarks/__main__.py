@@ -12,6 +12,7 @@ MEASUREMENTS = {
     "arcs": "benchmarks.random_arcs",
     "convergence": "benchmarks.convergence",
     "scaling": "benchmarks.scaling",
+    "maps": "benchmarks.maps",
     "accuracy": "benchmarks.screening_accuracy",
     "speed": "benchmarks.map_speed",
 }

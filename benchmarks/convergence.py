@@ -17,9 +17,9 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from benchmarks.named_charts import benchmark_chart
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.delay_equation import DelayEquation, delayed_mathieu
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged, Gauss, Linear, StructuredAveraged
 

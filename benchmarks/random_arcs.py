@@ -13,9 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.random_blades import random_rubbing_blade
 from benchmarks.textbook import spectral_radius_with_arcs
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.collocation import Collocation
 from sdm_core.errors import TooMuchWork
+from sdm_core.floquet.arc_stability import batch_multipliers
 from sdm_core.parallel import available_cores
 from sdm_core.rubbing_blade import RubbingBlade
 

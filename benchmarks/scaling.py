@@ -16,9 +16,9 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from benchmarks.random_blades import random_rubbing_blade
-from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.arc_stability import batch_multipliers
-from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged, Gauss, StructuredAveraged
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_boundary import arc_crossings
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
-from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.floquet.arc_boundary import arc_crossings
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.sensitivity import Gradient, critical_ke_sensitivity, multiplier_sensitivity
 from sdm_core.stability import stability

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade
-from sdm_core.closed_form import Crossings
 from sdm_core.contact import ContactConfiguration
+from sdm_core.crossings import Crossings
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.arc_stability import batch_multipliers
 from sdm_core.interruption import checkpoint
-from sdm_core.permanent_boundary import permanent_crossings
-from sdm_core.root_count import unstable_root_count
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.truncation import change_of_critical_ke, truncation_warnings
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses

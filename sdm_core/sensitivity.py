@@ -231,7 +231,7 @@ def critical_ke_sensitivity(problem: RubbingBlade, multiplier: complex) -> KeSen
 
     Examples
     --------
-    >>> from sdm_core.permanent_boundary import permanent_crossings
+    >>> from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
     >>> from sdm_core.rubbing_blade import single_state_problem
     >>> problem = single_state_problem([100.0], [2e-3], [[5.0]], [1.0], 70.0, 900.0)
     >>> crossing = permanent_crossings([problem], 1e5)[0]

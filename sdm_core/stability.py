@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_stability import batch_multipliers
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.delay_equation import DelayEquation
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged, Converged, Gauss, Structured
 from sdm_core.truncation import modes_enough

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.closed_form import Crossings
-from sdm_core.permanent_boundary import permanent_crossings
-from sdm_core.propagation import propagation_of
+from sdm_core.crossings import Crossings
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.propagation import propagation_of
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.validation import KE_LIMIT
 

@@ -7,7 +7,7 @@ import numpy as np
 from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from sdm_core.delay_equation import DelayEquation, delayed_mathieu, down_milling
-from sdm_core.receptance import ContactReceptance
+from sdm_core.permanent_contact.receptance import ContactReceptance
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 
 MATHIEU_RADIUS = 0.512052

@@ -8,7 +8,7 @@ import numpy as np
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
-from sdm_core.receptance import ContactReceptance
+from sdm_core.permanent_contact.receptance import ContactReceptance
 
 MODES = 5
 

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from sdm_core.contact import Segment
 from sdm_core.errors import RubscreenError
-from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from training.cases import CaseBatch
 

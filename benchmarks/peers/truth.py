@@ -8,10 +8,10 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks.named_charts import Chart
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
-from sdm_core.receptance import ContactReceptance
-from sdm_core.root_count import unstable_root_count
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.permanent_contact.receptance import ContactReceptance
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
 
 

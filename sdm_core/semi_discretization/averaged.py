@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.arc_propagation import exponentials
 from sdm_core.delay_equation import DelayEquation
+from sdm_core.floquet.arc_propagation import exponentials
 from sdm_core.semi_discretization.step_grid import StepGrid
 from sdm_core.semi_discretization.step_maps import StepMaps
 from sdm_core.semi_discretization.structured import Structured

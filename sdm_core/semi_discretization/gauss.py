@@ -8,9 +8,9 @@ from math import factorial
 
 import numpy as np
 
-from sdm_core.arc_propagation import exponentials
 from sdm_core.delay_equation import DelayEquation
 from sdm_core.errors import InvalidInput
+from sdm_core.floquet.arc_propagation import exponentials
 from sdm_core.semi_discretization.step_grid import StepGrid
 from sdm_core.semi_discretization.step_maps import StepMaps
 from sdm_core.semi_discretization.structured import Structured

@@ -10,14 +10,14 @@ from loky import get_reusable_executor
 from named_problems import benchmark_blade, random_problem
 from scipy.linalg import expm
 
-from sdm_core.arc_propagation import ArcPropagation, exponentials
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.boundary import verdicts
-from sdm_core.characteristic import CharacteristicEquation, count_outside, determinant
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
-from sdm_core.contact_expansion import ContactExpansion
 from sdm_core.errors import Cancelled
+from sdm_core.floquet.arc_propagation import ArcPropagation, exponentials
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation, count_outside, determinant
+from sdm_core.floquet.contact_expansion import ContactExpansion
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import stability

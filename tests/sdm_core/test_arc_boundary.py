@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.arc_stability import batch_multipliers
-from sdm_core.characteristic import CharacteristicEquation
-from sdm_core.closed_form import Crossings
 from sdm_core.collocation import Collocation
+from sdm_core.crossings import Crossings
 from sdm_core.errors import Cancelled
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 

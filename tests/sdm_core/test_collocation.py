@@ -17,11 +17,11 @@ from named_problems import (
 )
 from scipy.special import lambertw
 
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.delay_equation import Cosine, DelayEquation, Fourier, PeriodicMatrix
 from sdm_core.errors import Cancelled, InvalidInput, TooMuchWork
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Converged

@@ -5,13 +5,13 @@ import time
 import numpy as np
 import pytest
 
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade, ModalState
 from sdm_core.boundary import BoundarySolution, boundary, verdicts
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, InvalidInput
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import StabilitySolution, stability

@@ -10,13 +10,13 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from named_problems import random_problem, receptance
 
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade, ModalState
 from sdm_core.boundary import BoundarySolution, boundary
-from sdm_core.characteristic import CharacteristicEquation
-from sdm_core.closed_form import crossings
 from sdm_core.contact import ContactConfiguration
 from sdm_core.delay_equation import Engagement
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.permanent_contact.closed_form import crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged
 from sdm_core.stability import StabilitySolution, stability

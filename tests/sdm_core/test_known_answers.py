@@ -17,7 +17,7 @@ from named_problems import (
 from scipy.optimize import minimize_scalar
 
 from sdm_core.boundary import boundary, verdicts
-from sdm_core.root_count import unstable_root_count
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged, Converged
 from sdm_core.stability import stability

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from named_problems import benchmark_blade, random_problem, receptance
 
-from sdm_core.arc_boundary import least_destabilising_ke
 from sdm_core.boundary import boundary, verdicts
-from sdm_core.characteristic import CharacteristicEquation
-from sdm_core.closed_form import crossings
 from sdm_core.contact import ContactConfiguration
-from sdm_core.fredholm import LeadingMultipliers
-from sdm_core.receptance import swept
-from sdm_core.root_count import unstable_root_count
+from sdm_core.floquet.arc_boundary import least_destabilising_ke
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.floquet.fredholm import LeadingMultipliers
+from sdm_core.permanent_contact.closed_form import crossings
+from sdm_core.permanent_contact.receptance import swept
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Converged
 from sdm_core.stability import stability
@@ -141,9 +141,9 @@ def test_an_arc_boundary_with_an_undecided_verdict_is_not_proven(monkeypatch):
         none = np.zeros(len(ke), dtype=bool)
         return LeadingMultipliers(np.zeros((len(ke), 1)), np.zeros((len(ke), 1)), np.full(len(ke), -1), none)
 
-    monkeypatch.setattr("sdm_core.arc_boundary.leading_multipliers", unresolved)
+    monkeypatch.setattr("sdm_core.floquet.arc_boundary.leading_multipliers", unresolved)
     monkeypatch.setattr(
-        "sdm_core.arc_boundary.batch_multipliers",
+        "sdm_core.floquet.arc_boundary.batch_multipliers",
         lambda problems, **_: SimpleNamespace(stable=np.full(len(problems), np.nan)),
     )
     found = boundary(benchmark_blade(), contact, np.array([0.23]), 1.0)

@@ -9,12 +9,12 @@ from named_problems import AT_TIP, benchmark_blade, random_problem, receptance
 
 from sdm_core.blade import example_blade
 from sdm_core.boundary import verdicts
-from sdm_core.closed_form import crossings
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, TooMuchWork
 from sdm_core.interruption import interruptible
-from sdm_core.permanent_boundary import permanent_crossings
-from sdm_core.root_count import unstable_root_count
+from sdm_core.permanent_contact.closed_form import crossings
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 
 ON_THE_AXIS = -1

@@ -9,11 +9,11 @@ import pytest
 from named_problems import MILLING_RADIUS, benchmark_blade, mathieu, milling, random_problem
 from scipy.linalg import expm
 
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.delay_equation import DelayEquation, Fourier, PeriodicMatrix, Sampled
 from sdm_core.errors import InvalidInput, TooMuchWork
+from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged, Converged, Gauss, Linear, StructuredAveraged
 from sdm_core.semi_discretization import contact_map as contact_map_file

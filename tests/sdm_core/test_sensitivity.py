@@ -10,17 +10,17 @@ import pytest
 from named_problems import random_problem
 from scipy.optimize import fsolve
 
-from sdm_core.arc_boundary import least_destabilising_ke
-from sdm_core.arc_propagation import ArcPropagation
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import Blade, ModalState, example_blade
 from sdm_core.blade_sensitivity import critical_ke_sensitivities, growth_sensitivities
 from sdm_core.boundary import boundary
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
-from sdm_core.permanent_boundary import permanent_crossings
+from sdm_core.floquet.arc_boundary import least_destabilising_ke
+from sdm_core.floquet.arc_propagation import ArcPropagation
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 from sdm_core.sensitivity import (
     Gradient,

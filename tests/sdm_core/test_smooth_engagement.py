@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 from named_problems import random_problem
 from scipy.integrate import solve_ivp
 
-from sdm_core import smooth_revolution
-from sdm_core.arc_boundary import boundaries_with_arcs
-from sdm_core.arc_stability import batch_multipliers
 from sdm_core.blade import example_blade
 from sdm_core.boundary import boundary
-from sdm_core.characteristic import CharacteristicEquation
 from sdm_core.collocation import Collocation
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
+from sdm_core.floquet import smooth_revolution
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.floquet.propagation import propagation_of
 from sdm_core.fourier_engagement import MOST_HARMONICS, FourierEngagement
-from sdm_core.permanent_boundary import permanent_crossings
-from sdm_core.propagation import propagation_of
+from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 from sdm_core.semi_discretization.gauss import Gauss
 from sdm_core.stability import stability

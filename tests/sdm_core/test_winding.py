@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from named_problems import random_problem
 
+from sdm_core.floquet.winding import half_turns
 from sdm_core.semi_discretization import StructuredAveraged, reduced_equation
-from sdm_core.winding import half_turns
 
 Function = Callable[[np.ndarray], np.ndarray]
 

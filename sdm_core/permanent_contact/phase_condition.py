@@ -9,7 +9,7 @@ import numpy as np
 
 from sdm_core.errors import TooMuchWork
 from sdm_core.interruption import checkpoint
-from sdm_core.receptance import ContactReceptance, Sweep
+from sdm_core.permanent_contact.receptance import ContactReceptance, Sweep
 
 MOST_CANDIDATES = 1_000_000
 _AT_ONCE = 30_000  # guesses handed on together

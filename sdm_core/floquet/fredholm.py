@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.contact_expansion import ContactExpansion
+from sdm_core.floquet.contact_expansion import ContactExpansion
 from sdm_core.interruption import checkpoint
 
 _SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)

@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from sdm_core.arc_stability import batch_multipliers
-from sdm_core.characteristic import CharacteristicEquation
-from sdm_core.closed_form import Crossings
-from sdm_core.contact_expansion import ContactExpansion
-from sdm_core.fredholm import leading_multipliers, slopes
+from sdm_core.crossings import Crossings
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation
+from sdm_core.floquet.contact_expansion import ContactExpansion
+from sdm_core.floquet.fredholm import leading_multipliers, slopes
+from sdm_core.floquet.propagation import kind, propagation_of
 from sdm_core.interruption import checkpoint
 from sdm_core.parallel import available_cores, shared
-from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
 _WIDEST = 0.12  # of ln K_e between neighbouring samples

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from sdm_core.characteristic import CharacteristicEquation, count_outside
-from sdm_core.contact_expansion import ContactExpansion
-from sdm_core.fredholm import LeadingMultipliers, leading_multipliers
+from sdm_core.floquet.characteristic import CharacteristicEquation, count_outside
+from sdm_core.floquet.contact_expansion import ContactExpansion
+from sdm_core.floquet.fredholm import LeadingMultipliers, leading_multipliers
+from sdm_core.floquet.propagation import kind, propagation_of
 from sdm_core.parallel import available_cores, shared
-from sdm_core.propagation import kind, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits

@@ -8,7 +8,7 @@ from math import factorial
 
 import numpy as np
 
-from sdm_core.propagation import Propagation
+from sdm_core.floquet.propagation import Propagation
 
 _TERMS = np.array([6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
 FEWEST_TERMS, MOST_TERMS = int(_TERMS[0]), int(_TERMS[-1])

@@ -7,9 +7,9 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from sdm_core.arc_propagation import ArcPropagation
+from sdm_core.floquet.arc_propagation import ArcPropagation
+from sdm_core.floquet.smooth_propagation import SmoothPropagation
 from sdm_core.rubbing_blade import RubbingBlade
-from sdm_core.smooth_propagation import SmoothPropagation
 
 
 class Propagation(Protocol):

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sdm_core.floquet.propagation import Propagation, propagation_of
+from sdm_core.floquet.smooth_propagation import SmoothPropagation
+from sdm_core.floquet.winding import half_turns
 from sdm_core.interruption import checkpoint
-from sdm_core.propagation import Propagation, propagation_of
 from sdm_core.rubbing_blade import RubbingBlade
-from sdm_core.smooth_propagation import SmoothPropagation
-from sdm_core.winding import half_turns
 
 _LARGEST_GROWTH = 1e11  # of an entry of M: what is smaller than its rounding error no longer shows
 _AT_REST = 1e-10  # of the contact's displacement, relative to that of the modes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdm_core.interruption import checkpoint
-from sdm_core.receptance import ContactReceptance, FrequencyGrid
+from sdm_core.permanent_contact.receptance import ContactReceptance, FrequencyGrid
 
 _MOST_PIECES = 50  # in doubt at once for one K_e, by the entries of F
 

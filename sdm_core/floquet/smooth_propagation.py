@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sdm_core.floquet.smooth_revolution import SmoothRevolution
 from sdm_core.rubbing_blade import RubbingBlade
-from sdm_core.smooth_revolution import SmoothRevolution
 
 _KEPT = 2**25  # entries of all series kept of a batch: 256 MB
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdm_core.closed_form import Crossings, CrossingTable, all_crossings
+from sdm_core.crossings import Crossings
 from sdm_core.interruption import checkpoint
-from sdm_core.receptance import ContactReceptance, swept
-from sdm_core.root_count import unstable_root_count
+from sdm_core.permanent_contact.closed_form import CrossingTable, all_crossings
+from sdm_core.permanent_contact.receptance import ContactReceptance, swept
+from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import LEAST_DAMPING, RubbingBlade
 
 _CHECK = 1e-4  # distance from a crossing, relative in K_e, at which the root count proves it
