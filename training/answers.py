@@ -24,6 +24,9 @@ class PointAnswers:
         The surrogate's; NaN where the source is the exact core.
     spectral_radius, growth_per_revolution, chatter_hz, error_estimate
         The exact core's; NaN where the source is the surrogate.
+    unstable_multipliers, wear_lobes
+        Multipliers outside the unit circle, and wear lobes per revolution (chatter frequency over rotor
+        speed), likewise.
     source, reason
         Arrays of str, shape (m,).
     model, solver
@@ -38,6 +41,8 @@ class PointAnswers:
     growth_per_revolution: np.ndarray
     chatter_hz: np.ndarray
     error_estimate: np.ndarray
+    unstable_multipliers: np.ndarray
+    wear_lobes: np.ndarray
     source: np.ndarray
     reason: np.ndarray
     model: str | None

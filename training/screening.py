@@ -108,7 +108,7 @@ class Screener:
                 reason[(reason == CONFIDENT) & near] = NEAR_BOUNDARY
         exact = self._exact_rows(reason, policy)
         self._allow(exact.sum(), _POINT_S, blade, speed)
-        columns = np.full((4, len(speed)), np.nan)
+        columns = np.full((6, len(speed)), np.nan)
         probability[exact], stable[exact] = np.nan, np.nan
         rows = np.flatnonzero(exact)
         if len(rows):
@@ -121,8 +121,10 @@ class Screener:
                     found.growth_per_revolution,
                     found.chatter_hz,
                     found.error_estimate,
+                    np.nan if found.unstable_multipliers is None else found.unstable_multipliers,
+                    found.wear_lobes,
                 )
-        radius, growth, chatter, error = columns
+        radius, growth, chatter, error, outside, lobes = columns
         return PointAnswers(
             speed,
             stiffness,
@@ -132,6 +134,8 @@ class Screener:
             growth,
             chatter,
             error,
+            outside,
+            lobes,
             _source(exact),
             reason,
             self.model_id,

@@ -10,6 +10,7 @@ import numpy as np
 
 from sdm_core.crossings import Crossings
 from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.branch_samples import BranchSamples
 from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.floquet.contact_expansion import ContactExpansion
 from sdm_core.floquet.fredholm import leading_multipliers, slopes
@@ -108,50 +109,6 @@ def _crossings(problems: list[RubbingBlade], ke_max: float) -> list[Crossings]:
 
 
 @dataclass
-class _Samples:
-    """What is known at some K_e of some cases, by case and K_e.
-
-    Attributes
-    ----------
-    case, x
-        Speed and ln K_e.
-    outside
-        Multipliers outside the circle, −1 where not decided; 1 stands for one or more where
-        `followed` is false.
-    growth, slope, angle, turn
-        ln |μ| and arg μ of branches near the circle and their derivatives to ln K_e, shape (s, l);
-        growth −inf where there is none.
-    followed
-        False where contact is too strong for series.
-    solved
-        True where a crossing lies between this sample and the next.
-    """
-
-    case: np.ndarray
-    x: np.ndarray
-    outside: np.ndarray
-    growth: np.ndarray
-    slope: np.ndarray
-    angle: np.ndarray
-    turn: np.ndarray
-    followed: np.ndarray
-    solved: np.ndarray
-
-    def merged(self, other: _Samples) -> _Samples:
-        wide = max(self.growth.shape[1], other.growth.shape[1])
-        order = np.lexsort((np.r_[self.x, other.x], np.r_[self.case, other.case]))
-
-        def both(name: str) -> np.ndarray:
-            a, b = getattr(self, name), getattr(other, name)
-            if a.ndim == 2:
-                empty = -np.inf if name == "growth" else 0.0
-                a, b = (np.pad(v, ((0, 0), (0, wide - v.shape[1])), constant_values=empty) for v in (a, b))
-            return np.concatenate([a, b])[order]
-
-        return _Samples(*(both(name) for name in self.__dataclass_fields__))
-
-
-@dataclass
 class _Crossing:
     case: int
     x: float
@@ -229,14 +186,14 @@ class _Scan:
             x += list(np.log(at))
         return np.array(case, dtype=int), np.array(x)
 
-    def _sampled(self, case: np.ndarray, x: np.ndarray) -> _Samples:
+    def _sampled(self, case: np.ndarray, x: np.ndarray) -> BranchSamples:
         parts = [self._sample(case[i : i + _POINTS], x[i : i + _POINTS]) for i in range(0, len(x), _POINTS)]
         out = parts[0] if parts else self._sample(case, x)
         for part in parts[1:]:
             out = out.merged(part)
         return out
 
-    def _sample(self, case: np.ndarray, x: np.ndarray) -> _Samples:
+    def _sample(self, case: np.ndarray, x: np.ndarray) -> BranchSamples:
         checkpoint()
         ke = np.exp(x)
         outside = np.full(len(x), -1)
@@ -278,8 +235,8 @@ class _Scan:
             lowest = self.undecided.get(int(case[k]), np.inf)
             self.undecided[int(case[k])] = min(lowest, float(x[k]))
         none = np.zeros(len(x), dtype=bool)
-        out = _Samples(case, x, outside, growth, slope, angle, turn, followed, none)
-        return out.merged(_Samples(*(getattr(out, f)[:0] for f in out.__dataclass_fields__)))
+        out = BranchSamples(case, x, outside, growth, slope, angle, turn, followed, none)
+        return out.merged(BranchSamples(*(getattr(out, f)[:0] for f in out.__dataclass_fields__)))
 
     def _band(self, case: np.ndarray, ke: np.ndarray) -> np.ndarray:
         """Row of the series that serves each point, −1 where contact is too strong."""
@@ -290,14 +247,14 @@ class _Scan:
         row = np.where(held, row, 0)
         return np.where(held & self.series.resolved[row], row, -1)
 
-    def _wanted(self, s: _Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _wanted(self, s: BranchSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Next samples, by case and K_e: middles of intervals, and both sides of new crossings."""
         inner = (s.case[1:] == s.case[:-1]) & ~s.solved[:-1]
         width = np.where(inner, np.diff(s.x), 0.0)
         stable = s.outside == 0
         changes = inner & (stable[1:] != stable[:-1])
         followed = s.followed[1:] & s.followed[:-1] & inner & (width > NARROWEST_ISLAND)
-        split = followed & ~changes & _may_cross(s, width, stable)
+        split = followed & ~changes & s.may_cross(width)
         case, x, solved = [], [], []
         for i in np.flatnonzero(changes):
             crossing = self._solved(s, int(i))
@@ -331,7 +288,7 @@ class _Scan:
         order = np.lexsort((x, case))
         return np.array(case, dtype=int)[order], np.array(x)[order], np.array(solved, dtype=bool)[order]
 
-    def _solved(self, s: _Samples, i: int) -> _Crossing | None:
+    def _solved(self, s: BranchSamples, i: int) -> _Crossing | None:
         """The crossing between samples i and i + 1, by Newton's method from the unstable side."""
         from_above = s.outside[i] == 0
         side = i + 1 if from_above else i
@@ -372,7 +329,7 @@ class _Scan:
             int(s.case[i]), x, complex(np.exp(1j * angle)), 1.0 if from_above else -1.0, error + 1e-14
         )
 
-    def _collected(self, case: int, samples: _Samples) -> Crossings:
+    def _collected(self, case: int, samples: BranchSamples) -> Crossings:
         x, unstable = samples.x[samples.case == case], samples.outside[samples.case == case] != 0
         own = []
         for crossing in sorted((c for c in self.found if c.case == case), key=lambda c: c.x):
@@ -396,53 +353,3 @@ class _Scan:
             np.array([c.error for c in own]),
             proven=alternating and sure,
         )
-
-
-def _may_cross(s: _Samples, width: np.ndarray, stable: np.ndarray) -> np.ndarray:
-    """Whether the leading branch may come to the circle and back between two samples of one verdict.
-
-    A branch between its two tangents has its peak below their meeting point where it is concave; a
-    quarter of what the slopes could add is allowed for other shapes. Where a pair meets on the real
-    axis and goes on as two real multipliers, or the reverse, one of them may rise as a square root.
-    """
-    left, right = slice(None, -1), slice(1, None)
-    h = width[:, None]
-    with np.errstate(invalid="ignore"):
-        ahead = s.growth[left] + s.slope[left] * h  # at the right end, by the tangents of the left one
-        behind = s.growth[right] - s.slope[right] * h
-        from_left = np.maximum(s.growth[left], ahead) + _meeting(s, left, h, 1.0)
-        from_right = np.maximum(s.growth[right], behind) + _meeting(s, right, h, -1.0)
-        peaks = np.array([from_left.max(axis=1), from_right.max(axis=1)])
-        meets = (_meeting(s, left, h, 1.0) > 0).any(axis=1) | (_meeting(s, right, h, -1.0) > 0).any(axis=1)
-        valley = np.maximum(ahead.max(axis=1), behind.max(axis=1))
-    peak = np.where(meets, peaks.max(axis=0), peaks.min(axis=0))
-    steepest = np.maximum(np.abs(s.slope[left]).max(axis=1), np.abs(s.slope[right]).max(axis=1))
-    margin = 0.25 * steepest * width
-    island = stable[left] & stable[right] & (peak + margin > 0)
-    # A window of stability: every branch outside comes in, and another goes out before the next sample.
-    window = ~stable[left] & ~stable[right] & (valley - margin < 0)
-    return island | window
-
-
-def _meeting(s: _Samples, at: slice, h: np.ndarray, sense: float) -> np.ndarray:
-    """What ln |μ| may gain within h where two multipliers meet on the real axis, shape (s, l).
-
-    With δ² = b (x₀ − x) the distance δ from meeting, b is 2δ|dδ/dx|, and beyond the meeting the
-    two part by √(b h) at most.
-    """
-    angle, turn = s.angle[at], s.turn[at]
-    there = np.isfinite(s.growth[at])
-    off = np.minimum(np.abs(angle), np.pi - np.abs(angle))  # of a pair from the axis
-    closing = np.where(np.abs(angle) < 0.5 * np.pi, -turn, turn) * np.sign(angle) * sense
-    # Two real multipliers of one sign, next to one another by size: half their distance.
-    growth, slope = s.growth[at], s.slope[at]
-    real = there & (off == 0)
-    gap, shrinks = np.zeros_like(growth), np.zeros_like(growth)
-    for j in range(growth.shape[1] - 1):
-        twins = real[:, j] & real[:, j + 1] & (angle[:, j] == angle[:, j + 1])
-        with np.errstate(invalid="ignore"):
-            gap[:, j] = np.where(twins, 0.5 * (growth[:, j] - growth[:, j + 1]), 0.0)
-            shrinks[:, j] = np.where(twins, -0.5 * (slope[:, j] - slope[:, j + 1]) * sense, 0.0)
-    distance, speed = np.where(off > 0, off, gap), np.where(off > 0, closing, shrinks)
-    soon = there & (speed > 0) & (distance > 0) & (distance < 4 * speed * h)
-    return np.where(soon, np.sqrt(2 * distance * np.maximum(speed, 0.0) * h), 0.0)

@@ -21,6 +21,7 @@ _POINT_FLOATS = (
     "growth_per_revolution",
     "chatter_hz",
     "error_estimate",
+    "wear_lobes",
 )
 _BOUNDARY_FLOATS = ("critical_ke", "chatter_hz", "error_estimate")
 _LABELS = ("source", "reason")
@@ -34,12 +35,18 @@ def to_json(document: Json) -> bytes:
 
 def points_to_dict(answers: PointAnswers) -> Json:
     """The reply of ``POST /v1/stability``."""
-    return {"stable": _truths(answers.stable), **_columns(answers, _POINT_FLOATS), **_origin(answers)}
+    counts = [None if np.isnan(count) else int(count) for count in answers.unstable_multipliers]
+    return {
+        "stable": _truths(answers.stable),
+        **_columns(answers, _POINT_FLOATS),
+        "unstable_multipliers": counts,
+        **_origin(answers),
+    }
 
 
 def points_from_dict(reply: Json, speed_hz: np.ndarray, ke: np.ndarray) -> PointAnswers:
     """The answers in a reply of ``POST /v1/stability``."""
-    floats = _floats(reply, ("stable", *_POINT_FLOATS))
+    floats = _floats(reply, ("stable", *_POINT_FLOATS, "unstable_multipliers"))
     return PointAnswers(speed_hz=speed_hz, ke=ke, **floats, **_origin_from(reply))
 
 

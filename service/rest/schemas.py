@@ -28,6 +28,8 @@ class PointsReply(Reply):
     growth_per_revolution: list[float | None] = Field(description="ln of the spectral radius.")
     chatter_hz: list[float | None]
     error_estimate: list[float | None]
+    unstable_multipliers: list[int | None] = Field(description="Floquet multipliers outside the circle.")
+    wear_lobes: list[float | None] = Field(description="Per revolution: chatter_hz over speed_hz.")
     source: list[Source]
     reason: list[Reason]
 

@@ -71,6 +71,8 @@ class RuleScreener:
             growth_per_revolution=np.log(np.where(radius > 0, radius, np.nan)),
             chatter_hz=np.where(exact, 3.3 * speed_hz, np.nan),
             error_estimate=np.where(exact, 1e-6, np.nan),
+            unstable_multipliers=np.where(exact, 2.0 * (ke > self.critical), np.nan),
+            wear_lobes=np.where(exact, 3.3, np.nan),
             **origin,
         )
 

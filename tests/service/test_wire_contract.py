@@ -45,6 +45,8 @@ def test_points_say_which_source_answered_and_why(http, question):
     assert reply["growth_per_revolution"] == [None, None, pytest.approx(np.log(200.0))]
     assert reply["chatter_hz"] == [None, None, 330.0]
     assert reply["error_estimate"] == [None, None, 1e-6]
+    assert reply["unstable_multipliers"] == [None, None, 2]
+    assert reply["wear_lobes"] == [None, None, 3.3]
     assert (reply["model"], reply["solver"]) == ("rule-1", "rule")
 
 
