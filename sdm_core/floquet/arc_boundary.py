@@ -22,6 +22,7 @@ from sdm_core.rubbing_blade import RubbingBlade
 _WIDEST = 0.12  # of ln K_e between neighbouring samples
 _GREATEST_GROWTH = 0.1  # of the contact's growth a revolution between them, so that no branch is overtaken
 NARROWEST_ISLAND = 1e-3  # of ln K_e: what happens within less may be missed
+NARROWEST_UNFOLLOWED = 5e-3  # likewise where contact is too strong for branches to be followed
 _BRACKET = 1e-8  # of ln K_e, where Newton's method finds nothing
 _BESIDE = 1e-6  # of ln K_e: samples on both sides of a crossing
 _REACH = 1.3
@@ -89,7 +90,7 @@ def boundaries_with_arcs(
     if workers is None:
         workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
     parts = []
-    for one in sorted(set(kinds)):
+    for one in sorted(set(kinds), reverse=True):  # those that take longest first
         rows = np.flatnonzero([k == one for k in kinds])
         size = min(_SPEEDS, max(4, -(-len(rows) // workers)))
         parts += [rows[i : i + size] for i in range(0, len(rows), size)]
@@ -253,8 +254,10 @@ class _Scan:
         width = np.where(inner, np.diff(s.x), 0.0)
         stable = s.outside == 0
         changes = inner & (stable[1:] != stable[:-1])
-        followed = s.followed[1:] & s.followed[:-1] & inner & (width > NARROWEST_ISLAND)
-        split = followed & ~changes & s.may_cross(width)
+        followed = s.followed[1:] & s.followed[:-1]
+        split = inner & ~changes & followed & (width > NARROWEST_ISLAND) & s.may_cross(width)
+        # Without branches on both sides only closeness tells that a stable interval hides no island.
+        split |= inner & ~followed & stable[1:] & stable[:-1] & (width > NARROWEST_UNFOLLOWED)
         case, x, solved = [], [], []
         for i in np.flatnonzero(changes):
             crossing = self._solved(s, int(i))

@@ -115,7 +115,7 @@ def batch_multipliers(
         workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
     kinds = [kind(p) for p in problems]
     parts = []
-    for one in sorted(set(kinds)):
+    for one in sorted(set(kinds), reverse=True):  # those that take longest first
         members = np.flatnonzero([k == one for k in kinds])
         size = min(_CHUNK, max(_FEWEST, -(-len(members) // workers)))
         parts += [members[i : i + size] for i in range(0, len(members), size)]

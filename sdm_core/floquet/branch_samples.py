@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_SHARP = 0.02  # of ln K_e
+
 
 @dataclass
 class BranchSamples:
@@ -77,8 +79,11 @@ class BranchSamples:
         margin = 0.25 * steepest * width
         island = stable[left] & stable[right] & (peak + margin > 0)
         # A window of stability: every branch outside comes in, and another goes out before the next sample.
-        window = ~stable[left] & ~stable[right] & (valley - margin < 0)
-        return island | window
+        window = valley - margin < 0
+        # A bubble that a pair blows on the real axis turns sharply: near the circle only closeness tells.
+        top = np.minimum(self.growth[left].max(axis=1), self.growth[right].max(axis=1))
+        window |= (top < steepest * width) & (width > _SHARP)
+        return island | (~stable[left] & ~stable[right] & window)
 
     def _meeting(self, at: slice, h: np.ndarray, sense: float) -> np.ndarray:
         """What ln |μ| may gain within h where two multipliers meet on the real axis, shape (s, l).

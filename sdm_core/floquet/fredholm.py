@@ -13,6 +13,7 @@ _SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)
 _NEGLIGIBLE = 1e-13
 _ENOUGH = 1e-11  # of the series: what its zeros are found from, before Newton's method
 _ORIGIN = 1e-3
+_RIM = (1.0, 1.2)  # of R|μ|, between which the circle for counting lies
 _LAST_STEP = 1e-8  # of Newton's method on ln u
 _UNPOLISHED = 1e-5  # relative error of those zeros, also of double ones
 _NEAR_ONE = 1e-3  # of |ln |μ||: multipliers so near the circle are polished before they are counted
@@ -140,13 +141,12 @@ def _zeros(series: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarra
         roots[rows, :width] = np.take_along_axis(found, order, axis=1)[:, :width]
     modulus = np.abs(roots)
     # The circle on which zeros are counted runs through the widest gap between their moduli near the rim.
-    inside = np.where(modulus > 0.8, modulus, 0.8)
-    gaps = np.log(inside[:, :-1] / inside[:, 1:])
-    gaps[inside[:, :-1] > 1.25] = 0.0
-    widest = np.argmax(gaps, axis=1)
+    near = np.pad(np.clip(modulus, *_RIM), ((0, 0), (1, 1)), constant_values=_RIM[0])
+    near[:, 0] = _RIM[1]
+    near = -np.sort(-near, axis=1)
+    widest = np.argmax(near[:, :-1] / near[:, 1:], axis=1)
     rows = np.arange(b)
-    rim = np.sqrt(inside[rows, widest] * inside[rows, np.minimum(widest + 1, inside.shape[1] - 1)])
-    rim = np.clip(rim, 1.0, 1.2)
+    rim = np.sqrt(near[rows, widest] * near[rows, widest + 1])
     counted = _winding(series, 1.0 / rim) == (modulus > rim[:, None]).sum(axis=1)
     mu = roots / reach[:, None]
     tiny = np.abs(mu.imag) <= 1e-9 * np.abs(mu)
