@@ -12,7 +12,7 @@ from sdm_core.blade import Blade
 from sdm_core.boundary import BoundarySolution, boundary
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
-from sdm_core.lobe_tips import lobe_grid
+from sdm_core.lobe_tips import check_range, lobe_grid
 from sdm_core.validation import KE_LIMIT, number
 
 DEFAULT_TOLERANCE = 0.02
@@ -39,15 +39,35 @@ class AdaptiveMap:
     within: float
 
     def stable(self, speed_hz: np.ndarray, ke: np.ndarray) -> np.ndarray:
-        """1.0 stable, 0.0 unstable, at any points inside, edges interpolated in 1/Ω; shape of both.
+        """1.0 stable, 0.0 unstable, NaN where a neighbour is not decided; edges interpolated in 1/Ω.
 
         Between speeds with different numbers of edges the nearer one tells.
+
+        Raises
+        ------
+        InvalidInput
+            For shapes that do not go together, and points outside the map.
         """
         known, intervals = self.boundary.speed_hz, self.boundary.unstable_ke
-        speed_hz, ke = np.broadcast_arrays(np.asarray(speed_hz, float), np.asarray(ke, float))
+        try:
+            speed_hz, ke = np.broadcast_arrays(np.asarray(speed_hz, float), np.asarray(ke, float))
+        except (TypeError, ValueError):
+            raise InvalidInput("ke", ke, "give numbers in a shape that goes with speed_hz") from None
+        for name, values, low, high, unit in (
+            ("speed_hz", speed_hz, known[0], known[-1], "Hz"),
+            ("ke", ke, 0.0, self.boundary.ke_max, "N/m"),
+        ):
+            inside = (values >= low) & (values <= high)
+            if not inside.all():
+                raise InvalidInput(
+                    name,
+                    float(values[~inside].flat[0]),
+                    f"stay from {low:g} to {high:g} {unit}: the map ends there",
+                )
         out = np.ones(speed_hz.shape)
         right = np.clip(np.searchsorted(known, speed_hz), 1, len(known) - 1)
         share = (1 / known[right - 1] - 1 / speed_hz) / (1 / known[right - 1] - 1 / known[right])
+        unsure = ~np.isfinite(self.boundary.error_estimate)
         for at in np.ndindex(speed_hz.shape):
             a, b = intervals[right[at] - 1], intervals[right[at]]
             if len(a) == len(b):
@@ -56,6 +76,8 @@ class AdaptiveMap:
                 edges = np.array(a if share[at] < 0.5 else b)
             if any(low < ke[at] < high for low, high in edges.reshape(-1, 2)):
                 out[at] = 0.0
+            elif unsure[right[at] - 1] or unsure[right[at]]:
+                out[at] = np.nan
         return out
 
 
@@ -91,10 +113,9 @@ def adaptive_map(
     InvalidInput
         For an unusable range, stiffness or tolerance, or more lobes than can be followed.
     """
+    check_range(low_hz, high_hz)
     number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
     number("tolerance", tolerance, 1e-6, 1.0, "of K_e")
-    if not low_hz < high_hz:
-        raise InvalidInput("low_hz", low_hz, f"give a speed below high_hz = {high_hz:g} Hz")
     known = boundary(
         blade,
         contact,

@@ -11,6 +11,7 @@ import numpy as np
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.crossings import Crossings
+from sdm_core.errors import InvalidInput
 from sdm_core.floquet.arc_boundary import boundaries_with_arcs
 from sdm_core.floquet.arc_stability import batch_multipliers
 from sdm_core.interruption import checkpoint
@@ -44,7 +45,9 @@ class BoundarySolution:
         Relative error of `critical_ke`; infinite where the proof did not succeed, also of there
         being no crossing.
     unstable_ke
-        Intervals of instability up to `ke_max`, (low, high) in N/m, for each speed.
+        Intervals of instability up to `ke_max`, (low, high) in N/m, for each speed. With contact that varies
+        round the casing, stiffnesses too high to be decided count as unstable, and what happens within
+        0.1 % of K_e, or 0.5 % where contact is very strong, may be missed.
     method
         What was computed, in words.
     truncation_change
@@ -170,6 +173,8 @@ def verdicts(
     the multipliers of many points are solved for together.
     """
     speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
+    if len(speed) != len(stiffness):
+        raise InvalidInput("ke", f"{len(stiffness)} numbers", f"give one a speed: {len(speed)}")
     unique, index = np.unique(speed, return_inverse=True)
     problems = RubbingBlade.at_speeds(blade, contact, unique, extrapolate=extrapolate)
     if contact.permanent:

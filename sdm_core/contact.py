@@ -72,6 +72,10 @@ class ContactConfiguration:
     ) -> None:
         object.__setattr__(self, "weights", _checked_weights(weights))
         object.__setattr__(self, "arcs", None if arcs is None else _checked_arcs(arcs))
+        if engagement is not None and not isinstance(engagement, FourierEngagement):
+            raise InvalidInput(
+                "contact.engagement", engagement, "give a FourierEngagement(mean, cosine, sine)"
+            )
         if arcs is not None and engagement is not None:
             raise InvalidInput(
                 "contact.engagement", engagement.to_dict(), "give either arcs or engagement, not both"

@@ -54,7 +54,8 @@ class CriticalSpeed:
     lobes_per_revolution
         Wear lobes round the casing, chatter_hz / speed_hz.
     error_estimate
-        Relative error of `ke`: the core's at that speed, plus what the last round still changed.
+        Relative error of `ke`: the core's at that speed, plus what the last round still changed or a parabola
+        through the lowest speeds still lacks.
     """
 
     ke: float
@@ -76,6 +77,20 @@ def evenly_timed(low_hz: float, high_hz: float, count: int) -> np.ndarray:
     speeds = 1.0 / np.linspace(1.0 / low_hz, 1.0 / high_hz, count)
     speeds[0], speeds[-1] = low_hz, high_hz  # not an ulp beyond the modal data
     return speeds
+
+
+def check_range(low_hz: float, high_hz: float) -> None:
+    """Two rotor speeds, rising by more than rounding.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the field, the value and the remedy.
+    """
+    number("low_hz", low_hz, *SPEED_LIMITS_HZ, "Hz")
+    number("high_hz", high_hz, *SPEED_LIMITS_HZ, "Hz")
+    if low_hz >= high_hz * (1 - 1e-6):
+        raise InvalidInput("low_hz", low_hz, f"give a speed below high_hz = {high_hz:g} Hz, not next to it")
 
 
 def least_critical_ke(
@@ -114,11 +129,11 @@ def least_critical_ke(
     >>> found[0].ke <= found[1].ke
     True
     """
-    number("low_hz", low_hz, *SPEED_LIMITS_HZ, "Hz")
-    number("high_hz", high_hz, *SPEED_LIMITS_HZ, "Hz")
+    check_range(low_hz, high_hz)
     number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
-    if low_hz >= high_hz:
-        raise InvalidInput("low_hz", low_hz, f"give a speed below high_hz = {high_hz:g} Hz")
+    number("tolerance", tolerance, 1e-10, 1.0, "of K_e")
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise InvalidInput("count", count, "give a whole number from 1 up")
     reach = min(SEARCH_MARGIN * ke_max, KE_LIMIT)
 
     def exact(speed_hz: np.ndarray) -> FirstCrossings:
@@ -255,6 +270,10 @@ class _Lobe:
         rising = np.argsort(period)
         least = ke.min()
         change = abs(self.least - least) / least if np.isfinite(self.least) else np.inf
+        if np.isfinite(
+            change
+        ):  # the lowest may have stayed where it was: what lies below it by its neighbours
+            change = max(change, _still_below(period[rising], ke[rising]))
         return _Lobe(period[rising], ke[rising], chatter[rising], error[rising], change)
 
     def finer(self) -> np.ndarray:
@@ -275,6 +294,19 @@ class _Lobe:
             lobes_per_revolution=chatter / speed,
             error_estimate=float(self.error_estimate[i] + self.change),
         )
+
+
+def _still_below(period: np.ndarray, ke: np.ndarray) -> float:
+    """How far below the lowest point its tip may lie, relative: the drop of the parabola through it and its
+    neighbours."""
+    i = int(np.argmin(ke))
+    if i == 0 or i == len(ke) - 1 or not np.isfinite(ke[i - 1 : i + 2]).all():
+        return 0.0
+    x, y = period[i - 1 : i + 2] - period[i], ke[i - 1 : i + 2] - ke[i]
+    left, right = y[0] / x[0], y[2] / x[2]
+    bend = (right - left) / (x[2] - x[0])
+    slope = left - bend * x[0]
+    return float(slope**2 / (4 * bend) / ke[i]) if bend > 0 else 0.0
 
 
 def _lowest_minima(critical_ke: np.ndarray, count: int) -> np.ndarray:

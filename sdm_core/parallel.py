@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import numpy as np
 from loky import get_reusable_executor
 
+from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
 
 Part = TypeVar("Part")
@@ -28,6 +30,19 @@ def available_cores() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Windows or macOS
         return os.cpu_count() or 1
+
+
+def checked_workers(workers: Any) -> int:
+    """`workers` where it is a whole number from 1 up, at most the cores there are.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the value and the remedy.
+    """
+    if isinstance(workers, bool) or not isinstance(workers, int | np.integer) or workers < 1:
+        raise InvalidInput("workers", workers, "give a whole number from 1 up, or None for what pays")
+    return min(int(workers), max(available_cores(), 2))
 
 
 def shared(

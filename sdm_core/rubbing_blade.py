@@ -12,7 +12,17 @@ from sdm_core.contact import Arc, ContactConfiguration, Segment
 from sdm_core.delay_equation import DelayEquation, Engagement, Modulation
 from sdm_core.errors import InvalidInput
 from sdm_core.fourier_engagement import FourierEngagement
-from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
+from sdm_core.validation import (
+    AMPLITUDE_LIMIT,
+    FREQUENCY_LIMITS_HZ,
+    KE_LIMIT,
+    LARGEST_DAMPING,
+    SPEED_LIMITS_HZ,
+    WEIGHT_LIMIT,
+    matrix,
+    number,
+    vector,
+)
 
 LEAST_DAMPING = 1e-8
 """An undamped mode is taken with this ξ: the limit of vanishing damping, in which every proof holds."""
@@ -161,16 +171,27 @@ def single_state_problem(
     Raises
     ------
     InvalidInput
-        When the shapes disagree.
+        When the shapes disagree or a number is out of range.
     """
-    shape = np.asarray(mode_shape, dtype=float)
-    if shape.shape != (len(frequency_hz), len(weights)):
-        raise InvalidInput("mode_shape", f"shape {shape.shape}", "give one row a mode, one column a node")
+    frequency = vector("frequency_hz", frequency_hz, *FREQUENCY_LIMITS_HZ, "Hz")
+    if isinstance(damping_ratio, int | float | np.number):
+        damping_ratio = np.full(len(frequency), damping_ratio)
+    damping = vector("damping_ratio", damping_ratio, 0.0, LARGEST_DAMPING, "")
+    weight = vector("weights", weights, 0.0, WEIGHT_LIMIT, "")
+    shape = matrix("mode_shape", mode_shape, len(weight), -AMPLITUDE_LIMIT, AMPLITUDE_LIMIT, "kg^-1/2")
+    if not len(frequency) == len(damping) == len(shape):
+        raise InvalidInput(
+            "mode_shape",
+            f"{len(shape)} rows for {len(frequency)} frequencies and {len(damping)} damping ratios",
+            "give one row, one frequency and one damping ratio a mode",
+        )
+    number("speed_hz", speed_hz, *SPEED_LIMITS_HZ, "Hz")
+    number("ke", ke, 0.0, KE_LIMIT, "N/m")
     contact = ContactConfiguration({"all": 1.0}, arcs, engagement)
     return RubbingBlade(
-        2 * np.pi * np.asarray(frequency_hz, dtype=float),
-        np.asarray(damping_ratio, dtype=float),
-        np.sqrt(np.asarray(weights, dtype=float))[:, None] * shape.T,
+        2 * np.pi * frequency,
+        np.maximum(damping, LEAST_DAMPING),
+        np.sqrt(weight)[:, None] * shape.T,
         float(speed_hz),
         float(ke),
         *_pattern(contact),

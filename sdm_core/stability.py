@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdm_core.delay_equation import DelayEquation
+from sdm_core.errors import InvalidInput
 from sdm_core.floquet.arc_stability import batch_multipliers
 from sdm_core.floquet.characteristic import CharacteristicEquation
 from sdm_core.rubbing_blade import RubbingBlade
@@ -44,7 +45,8 @@ class StabilitySolution:
     multiplier
         The dominant one, of the upper half-plane.
     multipliers
-        The leading ones of the upper half-plane, largest first, at most `LISTED`.
+        The leading ones of the upper half-plane, largest first, at most `LISTED`: those within about a quarter
+        of the largest or outside the circle.
     spectral_radius
         |μ|.
     growth_per_revolution
@@ -117,11 +119,23 @@ def stability(
     0.5121
     """
     start = time.perf_counter()
+    if not isinstance(problem, RubbingBlade | DelayEquation):
+        raise InvalidInput(
+            "problem",
+            type(problem).__name__,
+            "give RubbingBlade.from_blade(blade, contact, speed_hz, ke) or a DelayEquation",
+        )
+    if method is not None and not isinstance(method, Method):
+        raise InvalidInput(
+            "method", method, "give an object like Characteristic(), Gauss(60) or Converged(1e-6)"
+        )
     if method is None and isinstance(problem, RubbingBlade):
         method = Characteristic()
     if isinstance(method, Characteristic):
         if not isinstance(problem, RubbingBlade):
-            raise TypeError("Characteristic needs a RubbingBlade; use Converged for a general equation")
+            raise InvalidInput(
+                "method", "Characteristic", "use Converged: the exact equation is that of a rubbing blade"
+            )
         nothing: tuple[str, ...] = ()
         asked = truncation and problem.ke > 0
         change, warnings = modes_enough(problem, _BEYOND * problem.ke) if asked else (np.nan, nothing)
@@ -155,6 +169,9 @@ def stabilities(
     progress, workers
         As in `batch_multipliers`.
     """
+    for i, problem in enumerate(problems if isinstance(problems, Sequence) else [None]):
+        if not isinstance(problem, RubbingBlade):
+            raise InvalidInput(f"problems[{i}]", type(problem).__name__, "give a list of RubbingBlade")
     nothing: list[tuple[str, ...]] = [()] * len(problems)
     unknown = [np.nan] * len(problems)
     return _exact(problems, time.perf_counter(), unknown, nothing, progress=progress, workers=workers)

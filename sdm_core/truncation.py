@@ -74,7 +74,7 @@ def modes_enough(problem: RubbingBlade, ke_max: float) -> tuple[float, tuple[str
     if len(problem.omega) == 1:
         return np.nan, ()
     ke_max = min(ke_max, KE_LIMIT)
-    if not problem.permanent:  # the first crossing lies far below such growth, which takes long to follow
+    if not problem.permanent:  # seldom is anything stable beyond, and it takes long to follow
         growth = float(propagation_of([problem]).phase_shift[0])
         ke_max = min(ke_max, _STRONGEST / max(growth, 1e-300))
     crossings = crossings_of([problem], ke_max)

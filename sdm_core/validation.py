@@ -14,6 +14,7 @@ SPEED_LIMITS_HZ = (1e-6, 1e6)
 KE_LIMIT = 1e15
 AMPLITUDE_LIMIT = 1e6
 WEIGHT_LIMIT = 1e6
+LARGEST_DAMPING = 0.999_999
 
 
 def number(field: str, value: Any, low: float, high: float, unit: str, *, open_low: bool = False) -> float:

@@ -13,7 +13,15 @@ from scipy.interpolate import CubicSpline
 
 from sdm_core.blade.tracking import rising_modes, tracked
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
-from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, SPEED_LIMITS_HZ, matrix, number, vector
+from sdm_core.validation import (
+    AMPLITUDE_LIMIT,
+    FREQUENCY_LIMITS_HZ,
+    LARGEST_DAMPING,
+    SPEED_LIMITS_HZ,
+    matrix,
+    number,
+    vector,
+)
 
 DIRECTIONS = ("casing_normal", "radial")
 
@@ -279,11 +287,10 @@ def _node_names(names: Any) -> tuple[str, ...]:
 
 
 def _damping(values: Any, modes: int) -> np.ndarray:
-    below_one = 0.999_999
     if isinstance(values, int | float | np.number):
-        damping = np.full(modes, number("damping_ratio", values, 0.0, below_one, ""))
+        damping = np.full(modes, number("damping_ratio", values, 0.0, LARGEST_DAMPING, ""))
     else:
-        damping = vector("damping_ratio", values, 0.0, below_one, "")
+        damping = vector("damping_ratio", values, 0.0, LARGEST_DAMPING, "")
         if len(damping) != modes:
             raise InvalidInput(
                 "damping_ratio", f"{len(damping)} numbers", f"give one number, or one a mode: {modes}"

@@ -16,8 +16,9 @@ from sdm_core.floquet.contact_expansion import ContactExpansion
 from sdm_core.floquet.fredholm import leading_multipliers, slopes
 from sdm_core.floquet.propagation import kind, propagation_of
 from sdm_core.interruption import checkpoint
-from sdm_core.parallel import available_cores, shared
+from sdm_core.parallel import available_cores, checked_workers, shared
 from sdm_core.rubbing_blade import RubbingBlade
+from sdm_core.validation import KE_LIMIT, number
 
 _WIDEST = 0.12  # of ln K_e between neighbouring samples
 _GREATEST_GROWTH = 0.1  # of the contact's growth a revolution between them, so that no branch is overtaken
@@ -85,10 +86,12 @@ def boundaries_with_arcs(
     workers
         Processes to share the work; None as in `batch_multipliers`.
     """
+    ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
     out: list[Crossings] = [Crossings.none()] * len(problems)
     kinds = [kind(p) for p in problems]
     if workers is None:
         workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
+    workers = checked_workers(workers)
     parts = []
     for one in sorted(set(kinds), reverse=True):  # those that take longest first
         rows = np.flatnonzero([k == one for k in kinds])

@@ -8,11 +8,12 @@ from functools import partial
 
 import numpy as np
 
+from sdm_core.errors import InvalidInput
 from sdm_core.floquet.characteristic import CharacteristicEquation, count_outside
 from sdm_core.floquet.contact_expansion import ContactExpansion
 from sdm_core.floquet.fredholm import LeadingMultipliers, leading_multipliers
 from sdm_core.floquet.propagation import kind, propagation_of
-from sdm_core.parallel import available_cores, shared
+from sdm_core.parallel import available_cores, checked_workers, shared
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits
@@ -21,7 +22,7 @@ _MODERATE, _MODERATE_EXPONENT = 60.0, 6.0
 _STRONG_EXPONENTS = (12.0, 9.0, 15.0, 18.0, 6.0, 10.5, 21.0, 13.5)
 _REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
 _CHUNK, _FEWEST = 250, 50  # problems solved together
-_WORTH_SHARING = 2000  # problems, for which it pays to start processes
+_WORTH_SHARING = 4000  # problems, for which it pays to start processes
 
 Progress = Callable[[int, int], None]
 
@@ -110,9 +111,12 @@ def batch_multipliers(
         Processes to share the work. None takes all cores that this process may use where there are
         problems enough to be worth it.
     """
+    if not isinstance(listed, int) or listed < 1:
+        raise InvalidInput("listed", listed, "give a whole number from 1 up")
     out = BatchMultipliers.unknown(len(problems), listed)
     if workers is None:
         workers = available_cores() if len(problems) >= _WORTH_SHARING else 1
+    workers = checked_workers(workers)
     kinds = [kind(p) for p in problems]
     parts = []
     for one in sorted(set(kinds), reverse=True):  # those that take longest first

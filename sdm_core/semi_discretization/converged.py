@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdm_core.delay_equation import DelayEquation
-from sdm_core.errors import TooMuchWork
+from sdm_core.errors import InvalidInput, TooMuchWork
 from sdm_core.semi_discretization.averaged import StructuredAveraged
 from sdm_core.semi_discretization.structured import Structured
+from sdm_core.validation import number
 
 _FOLLOWED = 20  # multipliers of both half-planes
 _AVERAGED = StructuredAveraged(aligned=True)
@@ -77,6 +78,17 @@ class Converged:
     first_steps: int = 20
     largest_state: int = 100_000
     scheme: Structured = _AVERAGED
+
+    def __post_init__(self) -> None:
+        number("tolerance", self.tolerance, 1e-14, 1.0, "of |μ|")
+        for name in ("first_steps", "largest_state"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 2:
+                raise InvalidInput(name, value, "give a whole number from 2 up")
+        if not isinstance(self.scheme, Structured):
+            raise InvalidInput(
+                "scheme", type(self.scheme).__name__, "give StructuredAveraged, Linear or Gauss, as an object"
+            )
 
     def dominant(self, equation: DelayEquation) -> ConvergedMultiplier:
         """Dominant multiplier of the equation."""

@@ -48,3 +48,27 @@ def test_bad_ranges_are_refused():
         adaptive_map(benchmark_blade(), contact, 0.2, 0.4, 1.0, tolerance=0.0)
     with pytest.raises(InvalidInput, match="ke_max"):
         adaptive_map(benchmark_blade(), contact, 0.2, 0.4, float("nan"))
+
+
+def test_points_outside_the_map_are_refused_not_called_stable():
+    found = adaptive_map(benchmark_blade(), ContactConfiguration.at("tip"), 0.3, 0.4, 2.0)
+    for speed, ke, field in (
+        (0.35, 2.1, "ke"),
+        (0.2, 1.0, "speed_hz"),
+        (0.35, float("nan"), "ke"),
+        (float("nan"), 1.0, "speed_hz"),
+        (0.35, -1.0, "ke"),
+    ):
+        with pytest.raises(InvalidInput, match=field):
+            found.stable(speed, ke)
+    with pytest.raises(InvalidInput, match="ke"):
+        found.stable([0.35, 0.36], [1.0, 1.0, 1.0])
+
+
+UNUSABLE = [(0.0, 0.4), (-5.0, 0.4), (0.2, float("inf")), ("x", 0.4), (0.3, 0.3 + 1e-9)]
+
+
+@pytest.mark.parametrize("low, high", UNUSABLE)
+def test_an_unusable_range_of_speeds_is_refused(low, high):
+    with pytest.raises(InvalidInput, match=r"low_hz|high_hz"):
+        adaptive_map(benchmark_blade(), ContactConfiguration.at("tip"), low, high, 1.0)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sdm_core.blade import Blade, ModalState
+from sdm_core.boundary import boundary, verdicts
 from sdm_core.collocation import Collocation
+from sdm_core.contact import ContactConfiguration
 from sdm_core.crossings import Crossings
 from sdm_core.errors import Cancelled
 from sdm_core.floquet.arc_boundary import boundaries_with_arcs
@@ -206,3 +209,66 @@ def test_a_second_multiplier_that_leaves_just_above_does_not_cost_the_proof():
     found = boundaries_with_arcs([problem], KE_MAX)[0]
     assert found.ke[0] == pytest.approx(0.06097563, rel=1e-6)
     assert found.proven and len(found.ke) == 1
+
+
+def test_islands_beside_crowded_multipliers_are_found_whatever_the_largest_stiffness():
+    # Several multipliers lie near the rim of the series' disc, where their number is hardest to count.
+    blade = Blade(
+        "crowded",
+        ["N0", "N1"],
+        [0.0045503, 0.00046485, 0.00370329, 0.00059029],
+        [
+            ModalState(
+                0.0,
+                np.array([100.0, 142.65872076, 417.27175192, 894.04561883]),
+                np.array(
+                    [
+                        [2.099806007904384, -1.6537306421246492],
+                        [-1.677898378191172, -0.648195385839754],
+                        [-0.2038333882217563, 1.5960966368439526],
+                        [-0.687276112952291, -1.6532805992018036],
+                    ]
+                ),
+            )
+        ],
+    )
+    weights = {"N0": 0.8382358221152599, "N1": 0.3084322224005896}
+    contact = ContactConfiguration(weights, [[0.21400095697175342, 1.156310459974056]])
+    speed = np.array([44.78055486167642])
+    for ke_max in (12_900.0, 13_428.5, 16_000.0, 40_000.0):
+        found = boundary(blade, contact, speed, ke_max, truncation=False)
+        assert found.critical_ke[0] == pytest.approx(12_694.2537743, rel=1e-9)
+        assert found.crossing == ("flip",)
+    assert found.unstable_ke[0][0] == pytest.approx((12_694.2537743, 13_312.2738097), rel=1e-9)
+    assert found.unstable_ke[0][1] == pytest.approx((13_804.8125888, 40_000.0), rel=1e-9)
+    inside = verdicts(blade, contact, np.repeat(speed, 3), np.array([12_600.0, 12_936.0, 13_400.0]))
+    assert list(inside) == [1.0, 0.0, 1.0]
+
+
+def test_a_window_of_stability_between_two_samples_is_found():
+    blade = Blade(
+        "window",
+        ["A", "B"],
+        [0.0010077314717082432, 0.01667757371503399, 0.0023276812060809473, 0.003414801185095067],
+        [
+            ModalState(
+                0.0,
+                np.array([100.0, 227.00946810977146, 343.28683539545966, 853.5668384916416]),
+                np.array(
+                    [
+                        [-0.917108982354061, 0.7941273471687995],
+                        [0.9337842950342559, 0.28700946280477196],
+                        [0.7207511552122003, 0.31505126653893445],
+                        [2.488645331126818, 0.44139710421845],
+                    ]
+                ),
+            )
+        ],
+    )
+    contact = ContactConfiguration({"A": 1.0, "B": 1.0}, [[0.6418346742499946, 1.2014776416885526]])
+    speed = np.array([41.59347073907887])
+    found = boundary(blade, contact, speed, 30_000.0, truncation=False)
+    assert len(found.unstable_ke[0]) == 2
+    assert found.unstable_ke[0][0] == pytest.approx((19_356.06911174, 20_613.13065139), rel=1e-8)
+    assert found.unstable_ke[0][1][0] == pytest.approx(21_849.20997097, rel=1e-8)
+    assert list(verdicts(blade, contact, np.repeat(speed, 2), np.array([20_500.0, 21_000.0]))) == [0.0, 1.0]

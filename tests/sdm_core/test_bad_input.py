@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from named_problems import benchmark_blade
 
 from sdm_core.blade import blade_from_dict, blade_to_dict, example_blade, read_blade, write_blade
-from sdm_core.boundary import boundary
+from sdm_core.boundary import boundary, verdicts
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile, InvalidInput
-from sdm_core.semi_discretization import Averaged
+from sdm_core.floquet.arc_boundary import boundaries_with_arcs
+from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.lobe_tips import least_critical_ke
+from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
+from sdm_core.semi_discretization import Averaged, Converged
+from sdm_core.stability import stabilities, stability
 
 GOOD = {
     "schema": "rubscreen/blade/1",
@@ -185,3 +191,33 @@ def test_no_blade_file_whatever_raises_anything_but_invalid_input(key, value):
 def test_no_contact_whatever_raises_anything_but_invalid_input(contact):
     with contextlib.suppress(InvalidInput):
         ContactConfiguration.from_dict(contact)
+
+
+def test_the_doors_of_the_core_name_what_they_cannot_use():
+    blade, contact = benchmark_blade(), ContactConfiguration.at("tip")
+    arcs = ContactConfiguration.at("tip", arcs=[[0.0, 0.25]])
+    problem = RubbingBlade.from_blade(blade, arcs, 0.3, 0.1)
+    asked = {
+        "problem": lambda: stability(None),
+        "method": lambda: stability(problem, "averaged"),
+        r"problems\[0\]": lambda: stabilities([blade]),
+        "tolerance": lambda: Converged(tolerance=float("nan")),
+        "first_steps": lambda: Converged(first_steps=0),
+        "scheme": lambda: Converged(scheme=Averaged(20)),
+        "workers": lambda: batch_multipliers([problem], workers=0),
+        "listed": lambda: batch_multipliers([problem], listed=-1),
+        "ke_max": lambda: boundaries_with_arcs([problem], float("nan")),
+        "contact.engagement": lambda: ContactConfiguration.at("tip", engagement=0.5),
+        "count": lambda: least_critical_ke(blade, contact, 0.2, 0.4, 4.0, count=2.5),
+        "low_hz": lambda: least_critical_ke(blade, contact, "x", 0.4, 4.0),
+        "ke = -1": lambda: single_state_problem([1.0], [1e-3], [[1.0]], [1.0], 0.3, -1.0),
+        r"damping_ratio\[0\]": lambda: single_state_problem([1.0], [-1e-3], [[1.0]], [1.0], 0.3, 1.0),
+        "speed_hz": lambda: single_state_problem([1.0], [1e-3], [[1.0]], [1.0], 0.0, 1.0),
+        r"frequency_hz": lambda: single_state_problem([], [], [], [1.0], 0.3, 1.0),
+    }
+    for field, ask in asked.items():
+        with pytest.raises(InvalidInput, match=field):
+            ask()
+    for one in (contact, arcs):
+        with pytest.raises(InvalidInput, match="ke = 1 numbers"):
+            verdicts(blade, one, [0.3, 0.4], [1.0])

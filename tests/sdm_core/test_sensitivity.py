@@ -316,6 +316,11 @@ def test_chatter_frequency_moves_as_its_derivative_says(arcs):
         assert (high - low) / (2e-5 * value) == pytest.approx(float(derivative), rel=1e-4, abs=1e-9)
 
 
+def damped(problem: RubbingBlade, damping: np.ndarray) -> RubbingBlade:
+    """The same with other damping ratios, also those that no blade may have."""
+    return replace(problem, damping_ratio=damping)
+
+
 def test_a_double_multiplier_is_flagged_and_has_no_derivatives():
     twins = single_state_problem([100.0, 100.0], [0.01, 0.01], [[2.0], [0.0]], [1.0], 37.0, 0.0)
     root = 2 * np.pi * 100.0 * (-0.01 + 1j * np.sqrt(1 - 1e-4))
@@ -324,12 +329,12 @@ def test_a_double_multiplier_is_flagged_and_has_no_derivatives():
     assert found.condition > 1e7
     assert np.isnan(found.growth.omega).all()
     # Critical damping: two equal roots with one eigenvector, the exponential's defective case.
-    critical = single_state_problem([100.0], [1.0], [[2.0]], [1.0], 370.0, 0.0)
+    critical = damped(single_state_problem([100.0], [0.5], [[2.0]], [1.0], 370.0, 0.0), np.ones(1))
     assert not multiplier_sensitivity(critical, np.exp(-2 * np.pi * 100.0 / 370.0)).simple
 
 
 def test_a_double_multiplier_is_flagged_also_when_approached_from_afar():
-    critical = single_state_problem([100.0], [1.0], [[2.0]], [1.0], 370.0, 0.0)
+    critical = damped(single_state_problem([100.0], [0.5], [[2.0]], [1.0], 370.0, 0.0), np.ones(1))
     found = multiplier_sensitivity(critical, np.exp(-2 * np.pi * 100.0 / 370.0) * (1 + 5e-4))
     assert not found.simple
 
@@ -396,7 +401,7 @@ def test_a_defective_coefficient_matrix_with_a_simple_multiplier_is_no_exception
     shape = np.array([[1.0], [3.0]])
 
     def problem(damping: np.ndarray) -> RubbingBlade:
-        return single_state_problem(frequency, damping, shape, np.ones(1), 70.0, 2e3)
+        return damped(single_state_problem(frequency, np.full(2, 0.5), shape, np.ones(1), 70.0, 2e3), damping)
 
     found = multiplier_sensitivity(problem(damping), stability(problem(damping)).multiplier)
     moved = [problem(damping + np.array([h * 1e-3, 0.0])) for h in STEPS]
