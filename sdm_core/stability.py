@@ -45,7 +45,7 @@ class StabilitySolution:
     multiplier
         The dominant one, of the upper half-plane.
     multipliers
-        The leading ones of the upper half-plane, largest first, at most `LISTED`: those within about a quarter
+        The leading ones of the upper half-plane, largest first, at most `LISTED`: those within a quarter
         of the largest or outside the circle.
     spectral_radius
         |μ|.
