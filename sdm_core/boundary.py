@@ -23,7 +23,7 @@ from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 
 CLOSED_FORM = "closed-form boundary, argument principle"
 CHARACTERISTIC = "exact characteristic equation, argument principle"
-_POINTS_AT_ONCE = 2000
+_POINTS_AT_ONCE = 20_000
 _ON_AXIS = 1e-9  # of a turn of the multiplier
 
 Progress = Callable[[int, int], None]
@@ -166,11 +166,21 @@ def verdicts(
     *,
     extrapolate: bool = False,
     progress: Progress | None = None,
+    workers: int | None = None,
 ) -> np.ndarray:
     """Exact verdicts at points (speed, K_e): 1.0 stable, 0.0 unstable, NaN not decided; shape (m,).
 
     In permanent contact the crossings at a speed decide all points of that speed at once; with arcs
     the multipliers of many points are solved for together.
+
+    Parameters
+    ----------
+    speed_hz, ke
+        Hz and N/m, shape (m,) each.
+    progress
+        Called with points solved and their number.
+    workers
+        Processes to share the work with arcs; None as in `batch_multipliers`.
     """
     speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
     if len(speed) != len(stiffness):
@@ -184,9 +194,13 @@ def verdicts(
         checkpoint()
         part = slice(start, start + _POINTS_AT_ONCE)
         points = [problems[i].with_ke(k) for i, k in zip(index[part], stiffness[part], strict=True)]
-        out[part] = batch_multipliers(points, dominant=False).stable
-        if progress is not None:
-            progress(min(start + _POINTS_AT_ONCE, len(speed)), len(speed))
+
+        def points_done(done: int, _: int, start: int = start) -> None:
+            if progress is not None:
+                progress(start + done, len(speed))
+
+        found = batch_multipliers(points, dominant=False, progress=points_done, workers=workers)
+        out[part] = found.stable
     return out
 
 

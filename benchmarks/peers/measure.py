@@ -65,6 +65,7 @@ def whole_chart(chart: Chart, truth: Truth) -> Row:
             chart.speed_hz,
             chart.ke,
             progress=lambda done, _: progress.update(task, completed=done),
+            workers=1,
         )
         took = time.perf_counter() - start
     return Row(

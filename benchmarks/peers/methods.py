@@ -69,7 +69,7 @@ class Multipliers:
     def prepare(self, chart: Chart) -> None: ...
 
     def answer(self, problem: RubbingBlade) -> Answer:
-        found = stability(problem)
+        found = stability(problem, truncation=False)
         radius = found.spectral_radius if np.isfinite(found.error_estimate) else np.nan
         return Answer(None if found.stable is None else not found.stable, radius)
 
