@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.delay_equation import DelayEquation
 from sdm_core.floquet.arc_propagation import exponentials
-from sdm_core.semi_discretization.step_grid import StepGrid
 from sdm_core.semi_discretization.step_maps import StepMaps
-from sdm_core.semi_discretization.structured import Structured
+from sdm_core.semi_discretization.structured import MeanCoefficients
 
 
 @dataclass(frozen=True)
-class StructuredAveraged(Structured):
+class StructuredAveraged(MeanCoefficients):
     """The scheme of [SBL] Eqs. 7-14, with the multipliers of its dense twin `Averaged`.
 
     Over a step the coefficients are their means (Eq. 10) and the delayed contact displacement the
@@ -22,15 +20,14 @@ class StructuredAveraged(Structured):
 
         V_i = ½C(z_i + z_{i+1}),  z_{i+1} = P_i z_i + R_i V_{i−N}.
 
-    Second order. Where an arc ends inside a step the mean keeps the second order, with a constant that
-    wobbles with N; on `aligned` steps it stays the same whenever N doubles.
+    Second order.
 
     Parameters
     ----------
     steps
         N, 2 to 1,000,000.
     aligned
-        Cut every smooth piece of the revolution into steps of its own, instead of N equal ones.
+        As in `MeanCoefficients`.
 
     Examples
     --------
@@ -40,22 +37,9 @@ class StructuredAveraged(Structured):
     0.51205
     """
 
-    aligned: bool = False
-
-    @property
-    def order(self) -> int:
-        return 2
-
     @property
     def values_a_step(self) -> int:
         return 1
-
-    def grid(self, equation: DelayEquation) -> StepGrid:
-        return (StepGrid.aligned if self.aligned else StepGrid.uniform)(equation, self.steps)
-
-    def coefficients(self, equation: DelayEquation, grid: StepGrid) -> tuple[np.ndarray, np.ndarray]:
-        a, b = grid.means(equation)
-        return a[:, None], b[:, None]
 
     def step_maps(self, a: np.ndarray, b: np.ndarray, length: np.ndarray, contact: np.ndarray) -> StepMaps:
         # R = ∫₀^h exp(As) ds B̂ from one exponential of a bordered matrix: A may be singular.

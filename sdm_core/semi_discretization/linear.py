@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.delay_equation import DelayEquation
 from sdm_core.floquet.arc_propagation import exponentials
-from sdm_core.semi_discretization.step_grid import StepGrid
 from sdm_core.semi_discretization.step_maps import StepMaps
-from sdm_core.semi_discretization.structured import Structured
+from sdm_core.semi_discretization.structured import MeanCoefficients
 
 
 @dataclass(frozen=True)
-class Linear(Structured):
+class Linear(MeanCoefficients):
     """First-order semi-discretization (Insperger, Stépán and Turi 2008), elsewhere also so called.
 
     Over a step of length h the delayed contact displacement is v_0 + (s/h)(v_1 − v_0), v_0 and v_1 its
@@ -30,7 +28,7 @@ class Linear(Structured):
     steps
         N, 2 to 1,000,000.
     aligned
-        Cut every smooth piece of the revolution into steps of its own, instead of N equal ones.
+        As in `MeanCoefficients`.
 
     Examples
     --------
@@ -40,22 +38,9 @@ class Linear(Structured):
     0.51205
     """
 
-    aligned: bool = False
-
-    @property
-    def order(self) -> int:
-        return 2
-
     @property
     def values_a_step(self) -> int:
         return 2
-
-    def grid(self, equation: DelayEquation) -> StepGrid:
-        return (StepGrid.aligned if self.aligned else StepGrid.uniform)(equation, self.steps)
-
-    def coefficients(self, equation: DelayEquation, grid: StepGrid) -> tuple[np.ndarray, np.ndarray]:
-        a, b = grid.means(equation)
-        return a[:, None], b[:, None]
 
     def step_maps(self, a: np.ndarray, b: np.ndarray, length: np.ndarray, contact: np.ndarray) -> StepMaps:
         # One exponential of z driven by v_0 and by v_1 − v_0, which v_0 grows by over the step.

@@ -120,6 +120,33 @@ class Structured(ABC):
         return ContactMap(StepMaps.joined(parts), kind[starts], np.add.reduceat(grid.repeat, starts))
 
 
+@dataclass(frozen=True)
+class MeanCoefficients(Structured):
+    """Schemes that replace the coefficients by their means over a step ([SBL] Eq. 10): of second order.
+
+    Where an arc ends inside a step the mean keeps the second order, with a constant that wobbles with N; on
+    `aligned` steps it stays the same whenever N doubles.
+
+    Parameters
+    ----------
+    aligned
+        Cut every smooth piece of the revolution into steps of its own, instead of N equal ones.
+    """
+
+    aligned: bool = False
+
+    @property
+    def order(self) -> int:
+        return 2
+
+    def grid(self, equation: DelayEquation) -> StepGrid:
+        return (StepGrid.aligned if self.aligned else StepGrid.uniform)(equation, self.steps)
+
+    def coefficients(self, equation: DelayEquation, grid: StepGrid) -> tuple[np.ndarray, np.ndarray]:
+        a, b = grid.means(equation)
+        return a[:, None], b[:, None]
+
+
 def _distinct(
     a: np.ndarray, b: np.ndarray, length: np.ndarray, known: dict[bytes, int]
 ) -> tuple[np.ndarray, np.ndarray]:
