@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from typing import Any, TypeVar
@@ -17,6 +19,7 @@ Part = TypeVar("Part")
 Result = TypeVar("Result")
 
 _LONGEST_WAIT = 0.1  # s between checkpoints of the calling process
+_LOOK_EVERY = 1.0  # s, whether the parent is still there
 _IDLE_S = 60.0  # after which workers leave
 _IN_WORKER = "RUBSCREEN_WORKER"
 _ALONE = {_IN_WORKER: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -45,6 +48,17 @@ def checked_workers(workers: Any) -> int:
     return min(int(workers), max(available_cores(), 2))
 
 
+def _leave_with(parent: int) -> None:
+    """Let this worker end when the process that started it has ended, however it did."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_EVERY)
+        os._exit(0)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def shared(
     work: Callable[[Part], Result], parts: Sequence[Part], workers: int
 ) -> Iterator[tuple[int, Result]]:
@@ -62,7 +76,13 @@ def shared(
     """
     left = dict(enumerate(parts))
     if workers > 1 and len(parts) > 1:
-        pool = get_reusable_executor(max_workers=workers, timeout=_IDLE_S, env=_ALONE)
+        pool = get_reusable_executor(
+            max_workers=workers,
+            timeout=_IDLE_S,
+            env=_ALONE,
+            initializer=_leave_with,
+            initargs=(os.getpid(),),
+        )
         pending: dict[Future[Result], int] = {}
         try:
             pending = {pool.submit(work, part): i for i, part in left.items()}

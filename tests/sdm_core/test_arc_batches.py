@@ -2,7 +2,11 @@
 
 import os
 import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,3 +180,38 @@ def test_a_worker_that_dies_costs_time_and_no_answer(monkeypatch):
     assert seen[-1] == 160
     np.testing.assert_array_equal(found.outside, expected.outside)
     np.testing.assert_allclose(np.abs(found.multiplier), np.abs(expected.multiplier), rtol=1e-12)
+
+
+SHARES = """
+import os, signal, sys
+sys.path.insert(0, "tests")
+from loky import get_reusable_executor
+from benchmarks.random_blades import random_rubbing_blade
+import numpy as np
+from sdm_core.floquet.arc_stability import batch_multipliers
+
+rng = np.random.default_rng(0)
+batch_multipliers([random_rubbing_blade(rng, 2) for _ in range(120)], workers=2)
+print(*get_reusable_executor(max_workers=2, reuse=True)._processes, flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_workers_leave_when_their_parent_is_killed():
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", SHARES], cwd=root, stdout=subprocess.PIPE, text=True, timeout=60
+    )
+    workers = [int(pid) for pid in done.stdout.split()]
+    assert len(workers) == 2
+    until = time.monotonic() + 10.0
+    while any(_alive(pid) for pid in workers) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(_alive(pid) for pid in workers)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
+    except FileNotFoundError:
+        return False
