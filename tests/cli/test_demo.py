@@ -52,6 +52,8 @@ def test_the_service_is_stopped_when_the_demo_fails(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_service_is_stopped_when_the_demo_is_interrupted(tmp_path, number):
     code = (
+        # Whoever starts tests in the background may have made children ignore SIGINT.
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import time, pathlib; from service import demo\n"
         f"with demo.running_service(pathlib.Path({str(tmp_path / 'log')!r})) as url:\n"
         "    print(url, flush=True); time.sleep(60)\n"
