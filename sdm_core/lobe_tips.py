@@ -13,6 +13,7 @@ from sdm_core.blade import Blade
 from sdm_core.boundary import boundary
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
+from sdm_core.rubbing_blade import check_blade_and_contact
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 
 # A lobe's edge is about K_e ∝ 1/|sin(2πf/Ω)|: 8 speeds a lobe of the highest mode bracket every tip,
@@ -155,6 +156,7 @@ def lobe_grid(blade: Blade, contact: ContactConfiguration, even_hz: np.ndarray, 
     InvalidInput
         When so many lobes lie in the range that `MOST_SPEEDS` would pass some by.
     """
+    check_blade_and_contact(blade, contact)
     low_hz, high_hz = float(even_hz[0]), float(even_hz[-1])
     highest = _highest_frequency(blade, contact, ke_max)
     lobes = highest * (1.0 / low_hz - 1.0 / high_hz)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 import time
@@ -14,6 +15,8 @@ from loky import get_reusable_executor
 
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
+
+_log = logging.getLogger(__name__)
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -94,8 +97,8 @@ def shared(
                     result = future.result()
                     del left[i]
                     yield i, result
-        except BrokenExecutor:  # a worker was killed, say for memory
-            pass
+        except BrokenExecutor as why:  # a worker was killed, say for memory
+            _log.warning("a worker ended (%s): the %d parts left are done in this process", why, len(left))
         finally:
             for future in pending:
                 future.cancel()

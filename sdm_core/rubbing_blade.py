@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -92,6 +93,7 @@ class RubbingBlade:
         extrapolate: bool = False,
     ) -> list[RubbingBlade]:
         """The problem at each of many rotor speeds, with K_e = 0."""
+        check_blade_and_contact(blade, contact)
         for i, speed in enumerate(speed_hz):
             number(f"speed_hz[{i}]", speed, *SPEED_LIMITS_HZ, "Hz")
         root = np.sqrt(contact.weight_vector(blade.tip_nodes))
@@ -144,6 +146,24 @@ class RubbingBlade:
             self.ke * self.contact_matrix,
             self.tau,
             modulation,
+        )
+
+
+def check_blade_and_contact(blade: Any, contact: Any) -> None:
+    """Refuse what is neither, before anything is asked of it.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the field, the type and the remedy.
+    """
+    if not isinstance(blade, Blade):
+        raise InvalidInput("blade", type(blade).__name__, "give a Blade, e.g. read_blade(path)")
+    if not isinstance(contact, ContactConfiguration):
+        raise InvalidInput(
+            "contact",
+            type(contact).__name__,
+            "give a ContactConfiguration, e.g. ContactConfiguration.at('LE')",
         )
 
 

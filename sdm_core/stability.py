@@ -169,7 +169,9 @@ def stabilities(
     progress, workers
         As in `batch_multipliers`.
     """
-    for i, problem in enumerate(problems if isinstance(problems, Sequence) else [None]):
+    if not isinstance(problems, Sequence):
+        raise InvalidInput("problems", type(problems).__name__, "give a list of RubbingBlade")
+    for i, problem in enumerate(problems):
         if not isinstance(problem, RubbingBlade):
             raise InvalidInput(f"problems[{i}]", type(problem).__name__, "give a list of RubbingBlade")
     nothing: list[tuple[str, ...]] = [()] * len(problems)

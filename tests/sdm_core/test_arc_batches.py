@@ -165,7 +165,7 @@ def test_a_shared_batch_stops_when_asked_and_tells_how_far_it_is():
             batch_multipliers(problems, workers=workers)
 
 
-def test_a_worker_that_dies_costs_time_and_no_answer(monkeypatch):
+def test_a_worker_that_dies_costs_time_and_no_answer(caplog):
     problems = random_problems(14, 160)
     expected = batch_multipliers(problems, workers=1)
     seen = []
@@ -178,6 +178,7 @@ def test_a_worker_that_dies_costs_time_and_no_answer(monkeypatch):
 
     found = batch_multipliers(problems, workers=2, progress=kill_one)
     assert seen[-1] == 160
+    assert "a worker ended" in caplog.text
     np.testing.assert_array_equal(found.outside, expected.outside)
     np.testing.assert_allclose(np.abs(found.multiplier), np.abs(expected.multiplier), rtol=1e-12)
 

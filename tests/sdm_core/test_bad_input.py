@@ -200,6 +200,10 @@ def test_the_doors_of_the_core_name_what_they_cannot_use():
     asked = {
         "problem": lambda: stability(None),
         "method": lambda: stability(problem, "averaged"),
+        "problems = RubbingBlade": lambda: stabilities(problem),
+        "blade = NoneType": lambda: boundary(None, contact, [0.3], 1.0),
+        "contact = dict": lambda: boundary(blade, {"tip": 1.0}, [0.3], 1.0),
+        "contact = NoneType": lambda: least_critical_ke(blade, None, 0.2, 0.4, 1.0),
         r"problems\[0\]": lambda: stabilities([blade]),
         "tolerance": lambda: Converged(tolerance=float("nan")),
         "first_steps": lambda: Converged(first_steps=0),
