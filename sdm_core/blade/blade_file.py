@@ -8,7 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sdm_core.blade.modal import Blade, ModalState
+from sdm_core.blade.tracking import FURTHER_SHAPES
 from sdm_core.errors import DamagedFile, InvalidInput
 
 SCHEMA = "rubscreen/blade/1"
@@ -16,9 +19,17 @@ EXAMPLES = ("nasa_rotor_37", "generic_compressor_blade")
 LARGEST_FILE_BYTES = 64 * 2**20
 
 _REQUIRED = ("name", "tip_nodes", "damping_ratio", "states")
-_OPTIONAL = ("direction", "design_speed_hz", "mass_kg", "tip_radius_m", "tip_z_m", "material")
+_OPTIONAL = (
+    "direction",
+    "design_speed_hz",
+    "mass_kg",
+    "tip_radius_m",
+    "tip_z_m",
+    "material",
+    "tip_theta_rad",
+)
 _STATE_REQUIRED = ("speed_hz", "frequency_hz", "mode_shape")
-_STATE_OPTIONAL = ("mode_shape_radial", "mode_shape_tangential")
+_STATE_OPTIONAL = (*FURTHER_SHAPES, "tip_growth_m", "untwist_rad")
 
 
 def blade_from_dict(data: Any) -> Blade:
@@ -44,9 +55,9 @@ def blade_from_dict(data: Any) -> Blade:
         if not isinstance(state, Mapping):
             raise InvalidInput(f"states[{i}]", state, f"give an object with {', '.join(_STATE_REQUIRED)}")
         _require(state, _STATE_REQUIRED, f"states[{i}].")
-        optional_shapes = [state.get(key) for key in _STATE_OPTIONAL]
+        given = {key: state[key] for key in _STATE_OPTIONAL if state.get(key) is not None}
         try:
-            parsed.append(ModalState(*(state[key] for key in _STATE_REQUIRED), *optional_shapes))
+            parsed.append(ModalState(*(state[key] for key in _STATE_REQUIRED), **given))
         except InvalidInput as error:
             raise error.under(f"states[{i}]") from None
     optional = {key: data[key] for key in _OPTIONAL if data.get(key) is not None}
@@ -61,7 +72,7 @@ def blade_to_dict(blade: Blade) -> dict[str, Any]:
         for key in ("frequency_hz", "mode_shape", *_STATE_OPTIONAL):
             value = getattr(state, key)
             if value is not None:
-                row[key] = value.tolist()
+                row[key] = value.tolist() if isinstance(value, np.ndarray) else value
         states.append(row)
     out: dict[str, Any] = {
         "schema": SCHEMA,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sdm_core.blade.tracking import rising_modes, tracked
+from sdm_core.blade.tracking import FURTHER_SHAPES, rising_modes, tracked
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.validation import (
     AMPLITUDE_LIMIT,
@@ -23,7 +23,7 @@ from sdm_core.validation import (
     vector,
 )
 
-DIRECTIONS = ("casing_normal", "radial")
+DIRECTIONS = ("casing_normal", "radial", "given")
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,14 @@ class ModalState:
         Natural frequencies, Hz, shape (n,), in any order.
     mode_shape
         Mass-normalised amplitudes at the tip nodes in the contact direction, kg^-1/2, shape (n, r).
-    mode_shape_radial, mode_shape_tangential
-        The same in two further directions, where known.
+    mode_shape_radial, mode_shape_tangential, mode_shape_axial
+        The same along the cylindrical directions of the rotor, where known.
+    tip_growth_m
+        Static displacement of the tip nodes in the contact direction by rotation, positive towards
+        the casing, m, shape (r,), where known.
+    untwist_rad
+        Turn of the tip's chord about the radial direction by rotation, rad, positive towards the
+        axial direction (the blade opens), where known.
     """
 
     speed_hz: float
@@ -47,6 +53,9 @@ class ModalState:
     mode_shape: np.ndarray
     mode_shape_radial: np.ndarray | None = None
     mode_shape_tangential: np.ndarray | None = None
+    mode_shape_axial: np.ndarray | None = None
+    tip_growth_m: np.ndarray | None = None
+    untwist_rad: float | None = None
 
     def __post_init__(self) -> None:
         speed = number("speed_hz", self.speed_hz, 0.0, SPEED_LIMITS_HZ[1], "Hz")
@@ -55,24 +64,28 @@ class ModalState:
         object.__setattr__(self, "speed_hz", speed)
         object.__setattr__(self, "frequency_hz", frequency)
         object.__setattr__(self, "mode_shape", shape)
-        for name in ("mode_shape_radial", "mode_shape_tangential"):
+        for name in FURTHER_SHAPES:
             if getattr(self, name) is not None:
                 checked = _shape(name, getattr(self, name), len(frequency), shape.shape[1])
                 object.__setattr__(self, name, checked)
+        if self.tip_growth_m is not None:
+            growth = vector("tip_growth_m", self.tip_growth_m, -1.0, 1.0, "m")
+            if len(growth) != shape.shape[1]:
+                raise InvalidInput(
+                    "tip_growth_m", f"{len(growth)} numbers", f"give one a tip node: {shape.shape[1]}"
+                )
+            object.__setattr__(self, "tip_growth_m", growth)
+        if self.untwist_rad is not None:
+            untwist = number("untwist_rad", self.untwist_rad, -np.pi, np.pi, "rad")
+            object.__setattr__(self, "untwist_rad", untwist)
 
     def reordered(self, order: np.ndarray, sign: np.ndarray) -> ModalState:
         """The same state with its modes in another order and with other signs."""
 
-        def turn(shape: np.ndarray | None) -> np.ndarray | None:
-            return None if shape is None else shape[order] * sign[:, None]
-
-        return ModalState(
-            self.speed_hz,
-            self.frequency_hz[order],
-            self.mode_shape[order] * sign[:, None],
-            turn(self.mode_shape_radial),
-            turn(self.mode_shape_tangential),
-        )
+        shapes = {"mode_shape": self.mode_shape}
+        shapes |= {key: getattr(self, key) for key in FURTHER_SHAPES if getattr(self, key) is not None}
+        turned = {key: shape[order] * sign[:, None] for key, shape in shapes.items()}
+        return replace(self, frequency_hz=self.frequency_hz[order], **turned)
 
 
 @dataclass(frozen=True)
@@ -91,8 +104,8 @@ class Blade:
         One or more modal states; one means no centrifugal effect. Modes are followed from state
         to state by shape and frequency and put in the order of the first state.
     direction
-        Direction of the amplitudes: ``casing_normal`` or ``radial``.
-    design_speed_hz, mass_kg, tip_radius_m, tip_z_m, material
+        Direction of the amplitudes: ``casing_normal``, ``radial`` or ``given`` (by whoever made it).
+    design_speed_hz, mass_kg, tip_radius_m, tip_z_m, material, tip_theta_rad
         As in the blade file; optional.
 
     Raises
@@ -119,6 +132,7 @@ class Blade:
     tip_radius_m: tuple[float, ...] | None = None
     tip_z_m: tuple[float, ...] | None = None
     material: dict[str, Any] | None = field(default=None, hash=False)
+    tip_theta_rad: tuple[float, ...] | None = None
 
     def __init__(
         self,
@@ -132,6 +146,7 @@ class Blade:
         tip_radius_m: Sequence[float] | None = None,
         tip_z_m: Sequence[float] | None = None,
         material: dict[str, Any] | None = None,
+        tip_theta_rad: Sequence[float] | None = None,
     ) -> None:
         put = object.__setattr__
         if not isinstance(name, str) or not name:
@@ -152,8 +167,13 @@ class Blade:
         put(self, "mass_kg", mass_kg)
         if mass_kg is not None:
             number("mass_kg", mass_kg, 0.0, 1e6, "kg", open_low=True)
-        for key, values in (("tip_radius_m", tip_radius_m), ("tip_z_m", tip_z_m)):
-            put(self, key, None if values is None else tuple(vector(key, values, -1e3, 1e3, "m")))
+        places = (
+            ("tip_radius_m", tip_radius_m, "m"),
+            ("tip_z_m", tip_z_m, "m"),
+            ("tip_theta_rad", tip_theta_rad, "rad"),
+        )
+        for key, values, unit in places:
+            put(self, key, None if values is None else tuple(vector(key, values, -1e3, 1e3, unit)))
             if values is not None and len(values) != len(self.tip_nodes):
                 raise InvalidInput(
                     key, f"{len(values)} numbers", f"give one a tip node: {len(self.tip_nodes)}"
@@ -250,22 +270,11 @@ class Blade:
         if direction != "radial" or any(shape is None for shape in radial):
             raise InvalidInput("direction", direction, "every state of the blade must give mode_shape_radial")
         states = [
-            replace(s, mode_shape=shape)
+            replace(s, mode_shape=shape, tip_growth_m=None)
             for s, shape in zip(self.states, radial, strict=True)
             if shape is not None
         ]
-        return Blade(
-            self.name,
-            self.tip_nodes,
-            self.damping_ratio,
-            states,
-            direction,
-            self.design_speed_hz,
-            self.mass_kg,
-            self.tip_radius_m,
-            self.tip_z_m,
-            self.material,
-        )
+        return replace(self, states=tuple(states), direction=direction)
 
 
 def _shape(name: str, values: Any, modes: int, nodes: int | None) -> np.ndarray:

@@ -13,6 +13,8 @@ from sdm_core.errors import ModesNotTracked
 if TYPE_CHECKING:
     from sdm_core.blade.modal import ModalState
 
+# Amplitudes of a modal state in further directions than that of contact, each (n, r).
+FURTHER_SHAPES = ("mode_shape_radial", "mode_shape_tangential", "mode_shape_axial")
 # A followed mode keeps its shape to within this distance (0 the same, 1 nothing in common) ...
 LARGEST_SHAPE_CHANGE = 0.35
 # ... and no other pairing may be as good to within this much.
@@ -71,7 +73,7 @@ def _pairing(before: ModalState, after: ModalState) -> tuple[np.ndarray, np.ndar
 
 def _all_directions(before: ModalState, after: ModalState) -> tuple[np.ndarray, np.ndarray]:
     a, b = [before.mode_shape], [after.mode_shape]
-    for name in ("mode_shape_radial", "mode_shape_tangential"):
+    for name in FURTHER_SHAPES:
         if getattr(before, name) is not None and getattr(after, name) is not None:
             a.append(getattr(before, name))
             b.append(getattr(after, name))

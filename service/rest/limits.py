@@ -13,6 +13,7 @@ from anyio import CapacityLimiter, to_thread
 from starlette.requests import Request
 
 from sdm_core.blade import Blade
+from sdm_core.blade.tracking import FURTHER_SHAPES
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, InvalidInput, OutOfSpeedRange, TooMuchWork
 from sdm_core.interruption import interruptible
@@ -57,7 +58,7 @@ def check_blade_size(blade: dict[str, Any], settings: Settings) -> None:
     check_length("blade.tip_nodes", nodes, settings.max_tip_nodes, reduce)
     for i, node in enumerate(nodes if isinstance(nodes, list) else ()):
         check_length(f"blade.tip_nodes[{i}]", node, settings.max_name_length, "shorten it")
-    for key in ("tip_radius_m", "tip_z_m"):
+    for key in ("tip_radius_m", "tip_z_m", "tip_theta_rad"):
         check_length(f"blade.{key}", blade.get(key), settings.max_tip_nodes, reduce)
     check_length("blade.damping_ratio", blade.get("damping_ratio"), settings.max_modes, reduce)
     states = blade.get("states")
@@ -69,11 +70,12 @@ def check_blade_size(blade: dict[str, Any], settings: Settings) -> None:
 
 def _check_state_size(field: str, state: dict[str, Any], settings: Settings) -> None:
     reduce = "reduce the modal data"
-    for key in ("frequency_hz", "mode_shape", "mode_shape_radial", "mode_shape_tangential"):
+    for key in ("frequency_hz", "mode_shape", *FURTHER_SHAPES):
         rows = state.get(key)
         check_length(f"{field}.{key}", rows, settings.max_modes, reduce)
         for j, row in enumerate(rows if isinstance(rows, list) else ()):
             check_length(f"{field}.{key}[{j}]", row, settings.max_tip_nodes, reduce)
+    check_length(f"{field}.tip_growth_m", state.get("tip_growth_m"), settings.max_tip_nodes, reduce)
 
 
 def check_reach(

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from sdm_core.blade import SCHEMA, Blade, ModalState, blade_to_dict, example_blade
+from sdm_core.blade.modal import DIRECTIONS
+from sdm_core.blade.tracking import FURTHER_SHAPES
 from sdm_core.contact import ContactConfiguration
 from sdm_core.fourier_engagement import MOST_HARMONICS
 from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, KE_LIMIT, SPEED_LIMITS_HZ, WEIGHT_LIMIT
@@ -42,8 +44,12 @@ STATE: Json = {
             **_AMPLITUDES,
             "description": "Mass-normalised amplitudes at the tip nodes, kg^-1/2: n rows of r.",
         },
-        "mode_shape_radial": _AMPLITUDES,
-        "mode_shape_tangential": _AMPLITUDES,
+        **dict.fromkeys(FURTHER_SHAPES, _AMPLITUDES),
+        "tip_growth_m": _row(
+            {"type": "number"},
+            description="Static displacement towards the casing by rotation, m: r of them.",
+        ),
+        "untwist_rad": {"type": "number", "description": "Turn of the tip's chord by rotation, rad."},
     },
 }
 BLADE: Json = {
@@ -58,7 +64,7 @@ BLADE: Json = {
             uniqueItems=True,
             description="Names of the tip nodes, leading to trailing edge: r of them.",
         ),
-        "direction": {"enum": ["casing_normal", "radial"], "default": "casing_normal"},
+        "direction": {"enum": list(DIRECTIONS), "default": "casing_normal"},
         "damping_ratio": {
             "oneOf": [_DAMPING, _row(_DAMPING)],
             "description": "One number, or one a mode.",
@@ -68,6 +74,7 @@ BLADE: Json = {
         "mass_kg": {"type": "number", "exclusiveMinimum": 0},
         "tip_radius_m": _row({"type": "number"}),
         "tip_z_m": _row({"type": "number"}),
+        "tip_theta_rad": _row({"type": "number"}),
         "material": {"type": "object"},
     },
 }
