@@ -72,7 +72,7 @@ class TipLine:
 
 
 def cylindrical_frames(position_m: np.ndarray, rotation_axis: np.ndarray) -> np.ndarray:
-    """Radial, tangential and axial unit vectors at points, for a rotor turning about an axis through the origin.
+    """Radial, tangential, axial unit vectors at points, the rotor turning about an axis through the origin.
 
     Parameters
     ----------
