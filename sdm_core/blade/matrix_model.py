@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 from scipy.sparse import csc_array, issparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
+from sdm_core.blade.factorization import SymmetricFactor
 from sdm_core.blade.modal import Blade, ModalState
 from sdm_core.blade.tip_line import TipLine, cylindrical_frames
 from sdm_core.errors import InvalidInput
@@ -247,16 +248,8 @@ def lowest_modes(stiffness: Matrix, mass: Matrix, count: int) -> tuple[np.ndarra
         except linalg.LinAlgError:
             raise InvalidInput("mass", f"{size} × {size}", "it is not positive definite") from None
         return omega2, shape
-    try:
-        factor = splu(
-            csc_array(stiffness),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        raise InvalidInput("stiffness", f"{size} × {size}", "it is singular: clamp the root") from None
-    inverse = LinearOperator((size, size), matvec=factor.solve, dtype=float)
+    solve = SymmetricFactor(csc_array(stiffness)).solve
+    inverse = LinearOperator((size, size), matvec=solve, dtype=float)
     # A fixed start, so that the same model gives the same shapes to the last bit.
     start = np.random.default_rng(0).standard_normal(size)
     omega2, shape = eigsh(csc_array(stiffness), count, csc_array(mass), sigma=0.0, OPinv=inverse, v0=start)
