@@ -13,7 +13,7 @@ from sdm_core.version import __version__
 from service.answerer import Answerer
 from service.rest import access_log, errors, openapi
 from service.rest.desk import Desk
-from service.rest.routes import health, models, stability
+from service.rest.routes import blades, health, models, stability
 from service.settings import Settings
 
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
@@ -61,6 +61,7 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
         swagger_ui_parameters={"validatorUrl": None},
     )
     app.include_router(stability.router)
+    app.include_router(blades.router)
     app.include_router(models.router)
     app.include_router(health.router)
     errors.install(app)

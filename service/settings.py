@@ -31,6 +31,8 @@ class Settings(BaseSettings):
         Speeds of one boundary request.
     max_modes, max_tip_nodes, max_states
         Size of a blade.
+    max_mesh_nodes
+        Nodes of the mesh of a profile to be built.
     max_arcs
         Arcs of engagement of a contact.
     max_vibrations_per_revolution
@@ -68,6 +70,7 @@ class Settings(BaseSettings):
     max_modes: Count = 64
     max_tip_nodes: Count = 256
     max_states: Count = 64
+    max_mesh_nodes: Count = 12_000
     max_arcs: Count = 64
     max_vibrations_per_revolution: Ratio = 1000.0
     max_frequency_span: Ratio = 1e4

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,15 +14,20 @@ from sdm_core.blade.finite_elements.equilibrium import Equilibrium, equilibrium
 from sdm_core.blade.finite_elements.solid_model import SolidModel
 from sdm_core.blade.matrix_model import MatrixModel, lowest_modes
 from sdm_core.blade.modal import Blade
-from sdm_core.blade.profile.blade_profile import BladeProfile
+from sdm_core.blade.profile.blade_profile import MOST_STATES, BladeProfile
 from sdm_core.blade.profile.sections import SectionTable
 from sdm_core.blade.solid_mesh import SolidMesh
 from sdm_core.blade.tip_line import TipLine
+from sdm_core.errors import ModesNotTracked
+from sdm_core.interruption import checkpoint
 
 # Share of the work done, 0 to 1, and what is being done. An exception raised here stops the build.
 Progress = Callable[[float, str], None]
 # Free modes kept beyond those asked for: the last of a Lanczos run are needed for tracking, not kept.
 _SPARE_MODES = 3
+# Of the interpolated modes against the full model's: K_e goes with the square of the amplitudes.
+FREQUENCY_TOLERANCE = 1e-3
+SHAPE_TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,12 @@ class ReductionCheck:
     def frequency_error(self) -> np.ndarray:
         """Relative, shape (n,)."""
         return self.reduced_frequency_hz / self.full_frequency_hz - 1.0
+
+    @property
+    def holds(self) -> bool:
+        """True where frequencies and tip shapes are within `FREQUENCY_TOLERANCE` and `SHAPE_TOLERANCE`."""
+        frequencies = np.abs(self.frequency_error).max() <= FREQUENCY_TOLERANCE
+        return bool(frequencies and self.shape_error.max() <= SHAPE_TOLERANCE)
 
 
 @dataclass(frozen=True)
@@ -84,6 +96,10 @@ def build_blade(
 ) -> BladeBuild:
     """Mesh a profile, find its equilibria, reduce it and take the modes at the tip.
 
+    Where modes cannot be followed from one rotor speed to the next, or the interpolated ones are off
+    the full model's by more than `FREQUENCY_TOLERANCE` or `SHAPE_TOLERANCE`, states are added between,
+    up to `MOST_STATES`.
+
     Parameters
     ----------
     verify
@@ -99,52 +115,85 @@ def build_blade(
         equilibrium at its speed (`NoEquilibrium`), or modes that cannot be followed.
     """
     started = time.perf_counter()
-    speeds = profile.state_speeds_hz
-    steps = _Steps(progress, len(speeds) + len(speeds) + len(speeds) + 2 + 2 * verify)
+    steps = _Steps(progress, 3 * len(profile.state_speeds_hz) + 2 + 2 * verify)
     steps.next("sections and mesh")
-    table = profile.sections()
-    mesh = SolidMesh.of(table.solid(profile.cut).positions, profile.subdivision)
-    model = SolidModel(mesh, profile.material)
-    on_mesh = profile.tip.on(mesh, _suction_side(table), profile.casing_slope)
-    equilibria: list[Equilibrium] = []
-    for speed in speeds:
-        steps.next(f"equilibrium at {speed:.4g} Hz")
-        equilibria.append(equilibrium(model, speed, equilibria[-1] if equilibria else None, steps.say))
-    reduction = CraigBampton(free_modes=profile.modes + _SPARE_MODES)
-    reduced = reduction.reduce(profile.name, model, on_mesh.nodes, equilibria, steps.next)
+    model = solid_model(profile)
+    on_mesh = profile.tip.on(model.mesh, _suction_side(profile.sections()), profile.casing_slope)
     tip = TipLine(
         on_mesh.names, [n + 1 for n in on_mesh.nodes], on_mesh.contact_directions, on_mesh.direction
     )
-    steps.next("modes at the tip")
-    blade = reduced.to_blade(
-        tip,
-        damping_ratio=profile.damping_ratio,
-        modes=profile.modes,
-        design_speed_hz=profile.design_speed_hz,
-        mass_kg=model.total_mass_kg,
-        material=profile.material.to_dict(),
-    )
-    check = _check(model, blade, on_mesh, equilibria, steps) if verify and len(speeds) > 1 else None
+    reduction = CraigBampton(free_modes=profile.modes + _SPARE_MODES)
+    known: dict[float, Equilibrium] = {}
+    speeds, check = list(profile.state_speeds_hz), None
+    while True:
+        equilibria = _equilibria(model, speeds, known, steps)
+        reduced = reduction.reduce(profile.name, model, on_mesh.nodes, equilibria, steps.next)
+        steps.next("modes at the tip")
+        try:
+            blade = reduced.to_blade(
+                tip,
+                damping_ratio=profile.damping_ratio,
+                modes=profile.modes,
+                design_speed_hz=profile.design_speed_hz,
+                mass_kg=model.total_mass_kg,
+                material=profile.material.to_dict(),
+            )
+        except ModesNotTracked:
+            if 2 * len(speeds) - 1 > MOST_STATES:
+                raise
+            speeds = sorted({*speeds, *(_between(a, b) for a, b in pairwise(speeds))})
+            steps.add(3 * (len(speeds) - len(equilibria)))
+            continue
+        if not verify or len(speeds) < 2:
+            break
+        check, between = _check(model, blade, on_mesh, equilibria, steps)
+        if check.holds or len(speeds) == MOST_STATES:
+            break
+        known[between.speed_hz] = between
+        speeds = sorted({*speeds, between.speed_hz})
+        steps.add(3 * len(speeds))
     progress(1.0, "done")
     return BladeBuild(
         blade,
         reduced,
         tip,
         check,
-        mesh.node_count,
+        model.mesh.node_count,
         model.size,
         len(reduced.dofs),
         time.perf_counter() - started,
     )
 
 
+def _equilibria(
+    model: SolidModel, speeds: list[float], known: dict[float, Equilibrium], steps: _Steps
+) -> list[Equilibrium]:
+    """At every speed, those found before taken from `known` and the others added to it."""
+    for speed in speeds:
+        if speed not in known:
+            steps.next(f"equilibrium at {speed:.4g} Hz")
+            slower = [known[s] for s in sorted(known) if s < speed]
+            known[speed] = equilibrium(model, speed, slower[-1] if slower else None, steps.say)
+    return [known[speed] for speed in speeds]
+
+
+def solid_model(profile: BladeProfile) -> SolidModel:
+    """The finite-element model of a profile.
+
+    Raises
+    ------
+    InvertedElements
+        Naming the place.
+    """
+    solid = profile.sections().solid(profile.cut)
+    return SolidModel(SolidMesh.of(solid.positions, profile.subdivision), profile.material)
+
+
 def _check(
     model: SolidModel, blade: Blade, tip: TipLine, equilibria: list[Equilibrium], steps: _Steps
-) -> ReductionCheck:
-    squares = np.array([each.speed_hz**2 for each in equilibria])
-    widest = int(np.argmax(np.diff(squares)))
-    # In the middle of the widest gap in Ω², where an interpolant in Ω² errs most.
-    speed = float(np.sqrt(0.5 * (squares[widest] + squares[widest + 1])))
+) -> tuple[ReductionCheck, Equilibrium]:
+    widest = int(np.argmax(np.diff([each.speed_hz**2 for each in equilibria])))
+    speed = _between(equilibria[widest].speed_hz, equilibria[widest + 1].speed_hz)
     steps.next(f"full model at {speed:.4g} Hz, to check the reduced one")
     between = equilibrium(model, speed, equilibria[widest + 1], steps.say)
     steps.next(f"modes of the full model at {speed:.4g} Hz")
@@ -159,7 +208,12 @@ def _check(
     full = at_tip[nearest]
     sign = np.sign(np.einsum("nr,nr->n", full, reduced.mode_shape))
     error = np.abs(full * sign[:, None] - reduced.mode_shape).max(axis=1) / np.abs(full).max(axis=1)
-    return ReductionCheck(speed, frequency[nearest], reduced.frequency_hz, error)
+    return ReductionCheck(speed, frequency[nearest], reduced.frequency_hz, error), between
+
+
+def _between(low_hz: float, high_hz: float) -> float:
+    """The middle in Ω², where an interpolant in Ω² errs most."""
+    return float(np.sqrt(0.5 * (low_hz**2 + high_hz**2)))
 
 
 def _suction_side(table: SectionTable) -> int:
@@ -178,10 +232,21 @@ class _Steps:
 
     def __init__(self, progress: Progress, total: int) -> None:
         self._progress, self._total, self._done, self._what = progress, total, -1, ""
+        self._shown = 0.0
+
+    def add(self, steps: int) -> None:
+        """More is to be done than was thought."""
+        self._total += steps
 
     def next(self, what: str) -> None:
+        checkpoint()
         self._done, self._what = self._done + 1, what
-        self._progress(min(self._done / self._total, 1.0), what)
+        self._tell(what)
 
     def say(self, detail: str) -> None:
-        self._progress(min(self._done / self._total, 1.0), f"{self._what}: {detail}")
+        checkpoint()
+        self._tell(f"{self._what}: {detail}")
+
+    def _tell(self, what: str) -> None:
+        self._shown = max(self._shown, min(self._done / self._total, 1.0))
+        self._progress(self._shown, what)

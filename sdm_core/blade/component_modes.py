@@ -105,7 +105,10 @@ class CraigBampton:
             np.concatenate((np.tile([1, 2, 3], len(nodes)), modal + MODAL)),
         )
         position = model.mesh.position_m
-        place = {int(n) + 1: (float(x), float(y), float(z)) for n, (x, y, z) in zip(nodes, position[nodes], strict=True)}
+        place = {
+            int(n) + 1: (float(x), float(y), float(z))
+            for n, (x, y, z) in zip(nodes, position[nodes], strict=True)
+        }
         return MatrixModel(name, dofs, reduced_mass, tuple(states), place)
 
 

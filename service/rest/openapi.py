@@ -10,7 +10,9 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
+from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion
 from service.rest.schemas import ProblemDocument
@@ -57,14 +59,14 @@ def install(app: FastAPI) -> None:
 
 
 def _components() -> Json:
-    described = (PointsQuestion, BoundaryQuestion, MapQuestion, ProblemDocument)
+    described = (PointsQuestion, BoundaryQuestion, MapQuestion, BladeQuestion, ProblemDocument)
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
     schemas = found["$defs"]
-    parts = {"blade": "Blade", "contact": "Contact"}
+    parts = {"blade": "Blade", "contact": "Contact", "profile": "Profile"}
     for schema in schemas.values():
         for field in parts.keys() & schema["properties"].keys():
             schema["properties"][field] = {"$ref": _REF.format(model=parts[field])}
-    return schemas | {"Blade": BLADE, "Contact": CONTACT}
+    return schemas | {"Blade": BLADE, "Contact": CONTACT, "Profile": PROFILE}
 
 
 if __name__ == "__main__":

@@ -27,10 +27,11 @@ from service.settings import Settings
 from training.answers import POLICIES
 
 
-def _blade(value: Any, info: ValidationInfo) -> Blade:
+def the_blade(value: Any, info: ValidationInfo) -> Blade:
+    """A blade within the limits, its errors named from `blade` on."""
     if not isinstance(value, dict):
         raise InvalidInput("blade", value, f"give an object with schema {SCHEMA!r}")
-    check_blade_size(value, _settings(info))
+    check_blade_size(value, settings_of(info))
     try:
         return blade_from_dict(value)
     except InvalidInput as error:
@@ -40,24 +41,24 @@ def _blade(value: Any, info: ValidationInfo) -> Blade:
 def _contact(value: Any, info: ValidationInfo) -> ContactConfiguration:
     if isinstance(value, dict):
         check_length(
-            "contact.weights", value.get("weights"), _settings(info).max_tip_nodes, "name fewer nodes"
+            "contact.weights", value.get("weights"), settings_of(info).max_tip_nodes, "name fewer nodes"
         )
-        check_length("contact.arcs", value.get("arcs"), _settings(info).max_arcs, "join arcs")
+        check_length("contact.arcs", value.get("arcs"), settings_of(info).max_arcs, "join arcs")
     return ContactConfiguration.from_dict(value)
 
 
 def _speeds(value: Any, info: ValidationInfo) -> np.ndarray:
-    check_length("speed_hz", value, _settings(info).max_points)
+    check_length("speed_hz", value, settings_of(info).max_points)
     return speeds("speed_hz", value)
 
 
 def _boundary_speeds(value: Any, info: ValidationInfo) -> np.ndarray:
-    check_length("speed_hz", value, _settings(info).max_boundary_speeds)
+    check_length("speed_hz", value, settings_of(info).max_boundary_speeds)
     return speeds("speed_hz", value)
 
 
 def _ke(value: Any, info: ValidationInfo) -> np.ndarray:
-    check_length("ke", value, _settings(info).max_points)
+    check_length("ke", value, settings_of(info).max_points)
     return stiffnesses("ke", value)
 
 
@@ -71,7 +72,8 @@ def _policy(value: Any) -> str:
     return value
 
 
-def _settings(info: ValidationInfo) -> Settings:
+def settings_of(info: ValidationInfo) -> Settings:
+    """The service's settings, given to pydantic as context."""
     assert isinstance(info.context, Settings)
     return info.context
 
@@ -86,7 +88,7 @@ class Question(BaseModel, ABC):
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
-    blade: Annotated[Blade, PlainValidator(_blade), WithJsonSchema(BLADE)]
+    blade: Annotated[Blade, PlainValidator(the_blade), WithJsonSchema(BLADE)]
     contact: Annotated[ContactConfiguration, PlainValidator(_contact), WithJsonSchema(CONTACT)]
     speed_hz: SpeedArray
     policy: Annotated[str, PlainValidator(_policy), WithJsonSchema(POLICY)] = "auto"
@@ -107,12 +109,12 @@ class Question(BaseModel, ABC):
         try:
             return cls.model_validate(data, context=settings)
         except ValidationError as error:
-            raise _first_fault(error, list(cls.model_fields)) from None
+            raise first_fault(error, list(cls.model_fields)) from None
 
     @model_validator(mode="after")
     def _the_core_can_reach_it(self, info: ValidationInfo) -> Self:
         field, ke = self._largest_ke()
-        check_reach(self.blade, self.contact, self.speed_hz, field, ke, _settings(info))
+        check_reach(self.blade, self.contact, self.speed_hz, field, ke, settings_of(info))
         return self
 
     @abstractmethod
@@ -156,7 +158,7 @@ class MapQuestion(KeQuestion):
 
     @model_validator(mode="after")
     def _not_too_many_points(self, info: ValidationInfo) -> Self:
-        points, most = len(self.speed_hz) * len(self.ke), _settings(info).max_points
+        points, most = len(self.speed_hz) * len(self.ke), settings_of(info).max_points
         if points > most:
             found = f"{len(self.speed_hz)} speeds x {len(self.ke)} stiffnesses = {points} points"
             raise TooLarge("speed_hz x ke", found, f"give at most {most} points: split the map by speed")
@@ -170,7 +172,7 @@ class MapQuestion(KeQuestion):
                 raise InvalidInput(field, values.tolist(), remedy)
 
 
-def _first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
+def first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
     """The first of pydantic's findings as the core would have said it."""
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")

@@ -60,6 +60,50 @@ class MapReply(Reply):
     unstable_share: float | None = Field(description="Share of the decided points that are unstable.")
 
 
+class FindingReply(BaseModel):
+    """Something about a blade that may be wrong, or is worth knowing."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    severity: Literal["warning", "note"]
+    field: str
+    what: str
+    remedy: str
+
+
+class ReductionReply(BaseModel):
+    """The reduced model's modes against the full one's, at a speed between those of the states."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    speed_hz: float
+    full_frequency_hz: list[float]
+    frequency_error: list[float] = Field(description="Relative, one a mode.")
+    shape_error: list[float] = Field(description="Of the tip amplitudes, relative to each mode's largest.")
+
+
+class BuildReply(BaseModel):
+    """How a profile became modal data."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    mesh_nodes: int
+    full_size: int = Field(description="Degrees of freedom of the finite-element model.")
+    reduced_size: int
+    seconds: float
+    reduction: ReductionReply | None = Field(description="null where it was not asked for.")
+
+
+class BladeReply(BaseModel):
+    """A checked blade file, ready for the other endpoints."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    blade: dict[str, Any] = Field(description="The blade file (rubscreen/blade/1).")
+    build: BuildReply | None = Field(description="null where modal data were given.")
+    findings: list[FindingReply] = Field(description="What an engineer should look at, if anything.")
+
+
 class ProblemDocument(BaseModel):
     """RFC 9457 problem details, with the field, its value and the remedy."""
 

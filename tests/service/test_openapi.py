@@ -40,6 +40,7 @@ def test_every_path_of_the_contract_is_there(document):
         "POST /v1/stability",
         "POST /v1/boundary",
         "POST /v1/map",
+        "POST /v1/blades",
         "GET /v1/models",
         "GET /healthz",
         "GET /readyz",

@@ -16,7 +16,8 @@ from sdm_core.errors import InvalidInput
 TOLERANCE = 1e-10
 # Below this an unbalance that no longer falls is rounding, as slender blades have it.
 ROUNDING = 1e-7
-_MOST_ITERATIONS = 12
+_MOST_ITERATIONS = 16
+_DIVERGED = 1e6
 # Smallest share of the load taken in one step before giving up.
 _SMALLEST_STEP = 1 / 256
 
@@ -113,8 +114,9 @@ def _newton(
         unbalance = float(np.linalg.norm(residual) / np.linalg.norm(external))
         if unbalance < TOLERANCE or (unbalance < ROUNDING and unbalance > 0.25 * before):
             return u, tangent, unbalance, iteration
-        # The first step from rest may overshoot; after it the unbalance must fall.
-        if not np.isfinite(unbalance) or (iteration > 2 and unbalance > before):
+        # Large turns make the unbalance rise and fall before it converges; one that is still large after
+        # half the steps does not.
+        if not unbalance < _DIVERGED or (iteration > _MOST_ITERATIONS // 2 and unbalance > 0.1):
             return None
         said(f"Newton step {iteration + 1}, unbalance {unbalance:.0e}")
         before = unbalance

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,8 @@ class BladeProfile:
         for name in parameters:
             if not hasattr(self.shape, name):
                 raise InvalidInput(name, parameters[name], "there is no such parameter")
-        return replace(self, shape=replace(self.shape, **parameters))
+        changed: dict[str, Any] = dict(parameters)
+        return replace(self, shape=replace(self.shape, **changed))
 
 
 def _damping(value: float | Sequence[float], modes: int) -> float | tuple[float, ...]:

@@ -1,0 +1,78 @@
+"""What ``POST /v1/blades`` is asked: a profile to be built, or modal data to be checked."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
+
+from sdm_core.blade import Blade
+from sdm_core.blade.profile import BladeProfile, profile_from_dict
+from sdm_core.errors import InvalidInput
+from service.rest.limits import TooLarge, check_length
+from service.rest.profile_schema import PROFILE
+from service.rest.question_schemas import BLADE
+from service.rest.questions import first_fault, settings_of, the_blade
+from service.settings import Settings
+
+
+def _profile(value: Any, info: ValidationInfo) -> BladeProfile:
+    settings = settings_of(info)
+    if isinstance(value, dict):
+        check_length("profile.name", value.get("name"), settings.max_name_length, "shorten it")
+    try:
+        profile = profile_from_dict(value)
+    except InvalidInput as error:
+        raise error.under("profile") from None
+    nodes = profile.subdivision.node_count
+    if nodes > settings.max_mesh_nodes:
+        raise TooLarge(
+            "profile.mesh",
+            f"{nodes:,} nodes",
+            f"give fewer elements, for at most {settings.max_mesh_nodes:,} nodes, or build it with "
+            "`rubscreen blade build`",
+        )
+    return profile
+
+
+class BladeQuestion(BaseModel):
+    """Either a profile, which is built, or modal data, which are checked."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    profile: Annotated[BladeProfile | None, PlainValidator(_profile), WithJsonSchema(PROFILE)] = None
+    blade: Annotated[Blade | None, PlainValidator(the_blade), WithJsonSchema(BLADE)] = None
+    verify: bool = True
+
+    @classmethod
+    def read(cls, data: Any, settings: Settings) -> Self:
+        """The question in a parsed body.
+
+        Raises
+        ------
+        InvalidInput
+            For the first field that cannot be used.
+        TooLarge
+            When the mesh is over the limit of `settings`.
+        """
+        if not isinstance(data, dict):
+            raise InvalidInput("body", data, f"send a JSON object with {', '.join(cls.model_fields)}")
+        try:
+            return cls.model_validate(data, context=settings)
+        except ValidationError as error:
+            raise first_fault(error, list(cls.model_fields)) from None
+
+    @model_validator(mode="after")
+    def _one_of_the_two(self) -> Self:
+        if (self.profile is None) == (self.blade is None):
+            found = "neither" if self.profile is None else "both"
+            raise InvalidInput("profile, blade", found, "give a profile to build, or modal data to check")
+        return self
