@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from sdm_core.blade.finite_elements import Material
 from sdm_core.blade.profile import BladeProfile, ParametricBlade
 from sdm_core.blade.solid_mesh import Shape, Subdivision
 
+# NASA TP 1659 / AGARD-AR-355; beside the repository where it is to be had, not part of it.
 ROTOR_37 = Path(__file__).parents[2] / "shared" / "data" / "nasa_rotor_37_sections.csv"
 ROTOR_37_DESIGN_HZ = 17_188.7 / 60.0
+
+needs_sections = pytest.mark.skipif(not ROTOR_37.exists(), reason="the sections of rotor 37 are not here")
+# Under continuous integration what is missing is a failure.
+needs_calculix = pytest.mark.skipif(
+    shutil.which("ccx") is None and not os.environ.get("CI"), reason="CalculiX (ccx) is not installed"
+)
 
 
 def block(length: float, width: float, height: float) -> Shape:

@@ -20,8 +20,10 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled
 from sdm_core.floquet.arc_propagation import ArcPropagation, exponentials
 from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.arc_steps import ArcSteps
 from sdm_core.floquet.characteristic import CharacteristicEquation, count_outside, determinant
 from sdm_core.floquet.contact_expansion import ContactExpansion
+from sdm_core.floquet.power_series import half_circle, real_series
 from sdm_core.interruption import interruptible
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import stability
@@ -77,6 +79,31 @@ def test_the_series_gives_the_fundamental_matrix_of_the_exponentials():
         series = ContactExpansion.of(motion, np.array([problem.ke]), np.array([1.2]))
         assert series.resolved.all()
         np.testing.assert_allclose(series.fundamental(c[None])[0], exact, atol=1e-12 * series.size[0])
+
+
+@pytest.mark.parametrize("strength", [1e-3, 1.0, 30.0])
+def test_short_steps_give_the_fundamental_matrix_of_the_exponentials(strength):
+    rng = np.random.default_rng(15)
+    arcs = [[[0.1, 0.3]], [[0.0, 0.2], [0.5, 0.9]], [[0.2, 0.25], [0.4, 0.6], [0.7, 0.95]], [[0.0, 1.0]]]
+    problems = [random_problem(np.random.default_rng(15), part, 0.05 * strength) for part in arcs]
+    motion, ke = ArcPropagation.of(problems), np.array([p.ke for p in problems])
+    case = rng.integers(0, 4, 60)
+    c = ke[case] * (rng.uniform(0, 1, 60) * np.exp(2j * np.pi * rng.uniform(0, 1, 60)) - 1)
+    exact = motion.fundamental(case, c)
+    size = np.abs(exact).max(axis=(1, 2))
+    steps = ArcSteps.of(motion, 2 * ke)
+    error = np.abs(steps.fundamental(case, c) - exact).max(axis=(1, 2))
+    assert (error < 30 * motion.rounding[case] * size).all()
+    kept = np.array([3, 1])  # a selection answers for itself
+    own = steps[kept].fundamental(np.array([0, 1]), -0.5 * ke[kept] + 0j)
+    np.testing.assert_array_equal(own, steps.fundamental(kept, -0.5 * ke[kept] + 0j))
+
+
+@pytest.mark.parametrize("terms", [2, 6, 16])
+def test_a_real_power_series_is_found_from_half_a_circle(terms):
+    coefficients = np.random.default_rng(terms).normal(size=(3, terms, 4))
+    powers = half_circle(terms)[:, None] ** np.arange(terms)
+    np.testing.assert_allclose(real_series(powers @ coefficients), coefficients, atol=1e-13)
 
 
 def test_without_contact_the_least_damped_mode_dominates():
@@ -190,6 +217,7 @@ from loky import get_reusable_executor
 from benchmarks.random_blades import random_rubbing_blade
 import numpy as np
 from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.floquet.arc_steps import ArcSteps
 
 rng = np.random.default_rng(0)
 batch_multipliers([random_rubbing_blade(rng, 2) for _ in range(120)], workers=2)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from named_solids import ROTOR_37, coarse_blade
+from named_solids import ROTOR_37, coarse_blade, needs_sections
 
 from sdm_core.blade.profile import (
     ParametricBlade,
@@ -74,7 +74,7 @@ def test_sections_are_met_exactly_by_the_solid_through_them(tmp_path):
             )
 
 
-@pytest.mark.skipif(not ROTOR_37.exists(), reason="the sections of rotor 37 are not here")
+@needs_sections
 def test_rotor_37_is_a_readable_table():
     sides = read_sections(ROTOR_37).sides
     assert (len(sides), sides[0].shape) == (12, (2, 100, 3))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
-from named_solids import ROTOR_37, ROTOR_37_DESIGN_HZ, coarse_blade
+from named_solids import ROTOR_37, ROTOR_37_DESIGN_HZ, coarse_blade, needs_calculix, needs_sections
 
 from sdm_core.blade.build import build_blade
 from sdm_core.blade.finite_elements import TITANIUM, SolidModel, equilibrium
@@ -16,9 +15,6 @@ from sdm_core.blade.finite_elements.calculix_deck import calculix_deck
 from sdm_core.blade.matrix_model import lowest_modes
 from sdm_core.blade.profile import BladeProfile, read_sections
 from sdm_core.blade.solid_mesh import SolidMesh, Subdivision
-
-needs_sections = pytest.mark.skipif(not ROTOR_37.exists(), reason="the sections of rotor 37 are not here")
-needs_calculix = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
 # DESIGN, known answers of issue 4: titanium, root clamped, at rest and at 17,189 rpm.
 AT_REST_HZ = (906.0, 2563.0, 3270.0, 4941.0, 6051.0)
