@@ -51,17 +51,26 @@ class Exponentials:
         np.matmul(powers[2], powers[2], out=powers[4])
         return cls(size, powers)
 
+    def squarings(self, x: np.ndarray) -> np.ndarray:
+        """How often x is halved for the series to converge, shape (k,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            needed = np.ceil(np.log2(np.maximum(self.size * x / _LARGEST_NORM, 1e-300)))
+        return np.clip(np.where(np.isnan(needed), 0, needed), 0, _MOST_SQUARINGS).astype(int)
+
     def over(self, x: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """exp(a x), x ≥ 0 of shape (k,), shape (k, d, d); or of some rows only."""
+        times = self.squarings(x)
+        out = self.step(x * 0.5**times, rows)
+        return squared(out, times if rows is None else times[rows])
+
+    def step(self, x: np.ndarray, rows: np.ndarray | slice | None = None) -> np.ndarray:
+        """exp(a x) where ‖a‖ x is small enough for the series, shape (k, d, d); or of some rows only."""
         powers, size = self.powers, self.size * x
         if rows is not None:
             powers, size = powers[:, rows], size[rows]
         _, k, d, _ = powers.shape
-        with np.errstate(divide="ignore", invalid="ignore"):
-            needed = np.ceil(np.log2(np.maximum(size / _LARGEST_NORM, 1e-300)))
-        squarings = np.clip(np.where(np.isnan(needed), 0, needed), 0, _MOST_SQUARINGS).astype(int)
         # Four terms of the series at a time, in one product of real numbers.
-        scaled = _TAYLOR * (size * 0.5**squarings)[:, None] ** np.arange(_DEGREE + 1)
+        scaled = _TAYLOR * size[:, None] ** np.arange(_DEGREE + 1)
         terms = np.zeros((k, 4, 5))
         terms[:, :, :4] = scaled[:, :16].reshape(k, 4, 4)
         terms[:, 3, 4] = scaled[:, 16]
@@ -72,25 +81,26 @@ class Exponentials:
         for j in (2, 1, 0):
             out = powers[4] @ out
             out += blocks[j]
-        return _squared(out, squarings)
+        return out
 
 
-def _squared(a: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Each matrix squared so many times."""
-    if len(a) == 0 or times.max() == 0:
+def squared(a: np.ndarray, times: np.ndarray, order: np.ndarray | None = None) -> np.ndarray:
+    """Each matrix squared so many times; `a` is used up.
+
+    `order` is that of falling `times`, where the matrices already lie in it; the answer is not in it.
+    """
+    if len(a) == 0:
         return a
-    most = int(times.max())
-    if times.min() == most:
-        for _ in range(most):
-            a = a @ a
-        return a
-    order = np.argsort(-times, kind="stable")  # those still to be squared lie together
-    a = a[order]
-    left = len(a) - np.cumsum(np.bincount(times, minlength=most + 1))
-    for count in left[:most]:
-        a[:count] = a[:count] @ a[:count]
-    out = np.empty_like(a)
-    out[order] = a
+    if order is None:
+        order = np.argsort(-times, kind="stable")  # those still to be squared lie together
+        a = a[order]
+    b, out = np.empty_like(a), np.empty_like(a)
+    left = len(a) - np.cumsum(np.bincount(times))
+    before = len(a)
+    for count in left:
+        out[order[count:before]] = a[count:before]
+        np.matmul(a[:count], a[:count], out=b[:count])
+        a, b, before = b, a, count
     return out
 
 
@@ -179,20 +189,9 @@ class ArcPropagation:
             starts = range(0, len(case), chunk)
             return np.concatenate([self.fundamental(case[i : i + chunk], c[i : i + chunk]) for i in starts])
         checkpoint()
-        n = self.angle.shape[1]
-        rate = np.zeros((len(case), 2 * n, 2 * n), dtype=np.result_type(c, float))
-        at = np.arange(n)
-        rate[:, at, n + at] = self.angle[case]
-        rate[:, n + at, at] = -self.angle[case]
-        rate[:, n + at, n + at] = -2 * self.damping_ratio[case] * self.angle[case]
-        rate[:, n:, :n] += c[:, None, None] * self.coupling[case]
         out: np.ndarray | None = None
         with np.errstate(all="ignore"):  # where c is huge entries overflow: callers look at the result
-            # Rows of (0, angle) and of (c coupling − angle, −2ξ angle), without looking at every entry.
-            rows = (1 + 2 * self.damping_ratio) * self.angle
-            pull = np.abs(self.coupling).sum(axis=2)
-            size = (rows[case] + np.abs(c)[:, None] * pull[case]).max(axis=1)
-            exponential = Exponentials.of(rate, size)
+            exponential = self.exponentials(case, c)
             for s in range(self.arcs.shape[1]):
                 length = self.arcs[case, s]
                 has = np.flatnonzero(length > 0)  # some have fewer arcs than others
@@ -208,6 +207,20 @@ class ArcPropagation:
                     out[fly] = self.flight(case[fly], s) @ out[fly]
         assert out is not None
         return out
+
+    def exponentials(self, case: np.ndarray, c: np.ndarray) -> Exponentials:
+        """Those of the motion in contact, of problem `case` each."""
+        n = self.angle.shape[1]
+        rate = np.zeros((len(case), 2 * n, 2 * n), dtype=np.result_type(c, float))
+        at = np.arange(n)
+        rate[:, at, n + at] = self.angle[case]
+        rate[:, n + at, at] = -self.angle[case]
+        rate[:, n + at, n + at] = -2 * self.damping_ratio[case] * self.angle[case]
+        rate[:, n:, :n] += c[:, None, None] * self.coupling[case]
+        # Rows of (0, angle) and of (c coupling − angle, −2ξ angle), without looking at every entry.
+        rows = (1 + 2 * self.damping_ratio) * self.angle
+        pull = np.abs(self.coupling).sum(axis=2)
+        return Exponentials.of(rate, (rows[case] + np.abs(c)[:, None] * pull[case]).max(axis=1))
 
     def flight(self, case: np.ndarray, s: int) -> np.ndarray:
         """Free motion after arc s: each mode by itself, in closed form, shape (k, 2n, 2n)."""

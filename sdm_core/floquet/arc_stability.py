@@ -11,16 +11,17 @@ import numpy as np
 from sdm_core.errors import InvalidInput
 from sdm_core.floquet.characteristic import CharacteristicEquation, count_outside
 from sdm_core.floquet.contact_expansion import ContactExpansion
+from sdm_core.floquet.disc_search import DiscSearch, likely_reach
 from sdm_core.floquet.fredholm import LeadingMultipliers, leading_multipliers
-from sdm_core.floquet.propagation import kind, propagation_of
+from sdm_core.floquet.propagation import for_many, kind, propagation_of
 from sdm_core.parallel import available_cores, checked_workers, shared
 from sdm_core.rubbing_blade import RubbingBlade
 
 _LARGEST_EXPONENT = 14.0  # of the growth on the rim: e^14 costs six digits
-# Discs tried in turn where the circle is out of reach; moderate growth has a multiplier on a smaller one.
-_MODERATE, _MODERATE_EXPONENT = 60.0, 6.0
-_STRONG_EXPONENTS = (12.0, 9.0, 15.0, 18.0, 6.0, 10.5, 21.0, 13.5)
-_REACHES = (1.3, 3.0, 12.0)  # times that of the least damped mode; each round those not found yet
+_CIRCLE = 1.3  # R of discs |u| < R that hold the unit circle, times that of the least damped mode
+_FARTHER, _FARTHEST = 3.0, 12.0  # R of those tried for multipliers deep inside, likewise
+_WIDER, _WIDEST = 1.4, 0.99  # from one disc to the next, and R of the last, where the circle is out of reach
+_MOST_DISCS = 8
 _CHUNK, _FEWEST = 250, 50  # problems solved together
 _WORTH_SHARING = 4000  # problems, for which it pays to start processes
 
@@ -141,43 +142,49 @@ def _solve(problems: list[RubbingBlade], *, dominant: bool, thorough: bool, list
     ke = np.array([p.ke for p in problems])
     # Without contact the series is a constant: any tiny disc holds it.
     centre = np.maximum(ke, 1e-18 / np.maximum(motion.phase_shift, 1e-300))
-    growth = np.maximum(
-        motion.phase_shift * centre, 1e-300
-    )  # over a revolution, to first order, at |Im c| = K_e
+    # Over a revolution, to first order, at |Im c| = K_e.
+    growth = np.maximum(motion.phase_shift * centre, 1e-300)
     slowest = np.exp((motion.damping_ratio * motion.angle).min(axis=1))
-    todo = np.flatnonzero(growth * _REACHES[0] * slowest < _LARGEST_EXPONENT)
-    for factor in _REACHES:
-        if len(todo) == 0:
-            break
-        # At least as far as the circle, else the largest disc whose series holds its digits.
-        reach = np.maximum(_REACHES[0], np.minimum(factor * slowest[todo], _LARGEST_EXPONENT / growth[todo]))
-        series = ContactExpansion.of(motion[todo], centre[todo], reach)
-        found = leading_multipliers(series, ke[todo], polished=listed)
-        decided = (found.outside >= 0) & ((found.multiplier[:, 0] != 0) | (not dominant))
-        at = todo[decided]
-        out.listed(at, found, decided)
-        out.outside[at] = found.outside[decided]
-        out.by_series[at] = True
-        todo = todo[~decided]
-    rest = np.flatnonzero(~out.by_series)
-    if len(rest) == 0:
+    # At least as far as the circle, else the largest disc whose series holds its digits.
+    held = _LARGEST_EXPONENT / growth
+    todo = np.flatnonzero(_CIRCLE * slowest < held)
+    if len(todo):
+        reach = np.maximum(_CIRCLE, np.minimum(_CIRCLE * slowest, held))[todo]
+        found = leading_multipliers(
+            ContactExpansion.of(motion[todo], centre[todo], reach), ke[todo], polished=listed
+        )
+        decided = found.outside >= 0
+        out.listed(todo[decided], found, decided)
+        out.outside[todo] = found.outside
+        out.by_series[todo] = decided
+    # Those whose dominant multiplier lies farther inside than the disc reaches.
+    inner = out.by_series & (out.multiplier == 0) & dominant
+    rest = ~out.by_series
+    pending = np.flatnonzero(rest | inner)
+    if len(pending) == 0:
         return out
-    out.outside[rest] = count_outside(motion[rest], ke[rest])
+    largest = np.where(inner, np.minimum(_FARTHEST * slowest, held), _WIDEST)
+    many = for_many(motion[pending], ((1 + np.maximum(largest, 1.0)) * centre)[pending])
+    if rest.any():
+        out.outside[rest] = count_outside(motion[rest], ke[rest], many[rest[pending]])
     # Much contact: multipliers far outside the circle are found on a smaller disc, and prove instability
     # even where rounding hides the number of the others.
-    wanted = growth[rest] * _REACHES[0] >= 1.0
-    strong = rest[wanted & (dominant | (out.outside[rest] < 0))]
-    for exponent in (_MODERATE_EXPONENT, *_STRONG_EXPONENTS):
-        if len(strong) == 0:
+    strong = rest & (growth * _CIRCLE >= 1.0) & (dominant | (out.outside < 0))
+    first = _FARTHER * slowest
+    first[strong] = likely_reach(many[strong[pending]], centre[strong], growth[strong], _WIDEST)
+    seek, many = np.flatnonzero(inner | strong), many[(inner | strong)[pending]]
+    wider = np.where(inner, _FARTHEST / _FARTHER, _WIDER)
+    search = DiscSearch.of(first[seek], largest[seek], wider[seek])
+    for _ in range(_MOST_DISCS):
+        if len(seek) == 0:
             break
-        exponents = np.where(growth[strong] < _MODERATE, exponent, max(exponent, _STRONG_EXPONENTS[0]))
-        reach = np.minimum(exponents / growth[strong], 0.99)
-        expansion = ContactExpansion.of(motion[strong], centre[strong], reach)
-        found = leading_multipliers(expansion, ke[strong], polished=listed)
+        expansion = ContactExpansion.of(motion[seek], centre[seek], search.reach, many)
+        found = leading_multipliers(expansion, ke[seek], polished=listed)
         far = found.resolved & (found.multiplier[:, 0] != 0)
-        out.listed(strong[far], found, far)
-        strong = strong[~far]
-    for k in rest if thorough else ():
+        out.listed(seek[far], found, far)
+        search, go = search.after(found.resolved, far)
+        seek, many = seek[go], many[go]
+    for k in pending if thorough else ():
         count, equation = int(out.outside[k]), CharacteristicEquation(problems[k])
         if out.multiplier[k] != 0 or not (dominant or count < 0):
             continue

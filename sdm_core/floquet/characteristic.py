@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sdm_core.floquet.propagation import Propagation, propagation_of
+from sdm_core.floquet.propagation import Fundamental, Propagation, for_many, propagation_of
 from sdm_core.floquet.smooth_propagation import SmoothPropagation
 from sdm_core.floquet.winding import half_turns
 from sdm_core.interruption import checkpoint
@@ -33,8 +33,12 @@ def first_points(motion: Propagation, ke: np.ndarray, radius: float = 1.0) -> np
     return 17 + np.minimum(1000.0, 0.5 * motion.phase_shift * ke * (1 + 1 / radius)).astype(int)
 
 
-def count_outside(motion: Propagation, ke: np.ndarray) -> np.ndarray:
-    """Multipliers outside the unit circle of each problem of a batch, shape (b,); −1 where not decided."""
+def count_outside(motion: Propagation, ke: np.ndarray, many: Fundamental | None = None) -> np.ndarray:
+    """Multipliers outside the unit circle of each problem of a batch, shape (b,); −1 where not decided.
+
+    `many` is the same motion `for_many` |c| ≤ 2 K_e, where already there.
+    """
+    ready = for_many(motion, 2 * ke) if many is None else many
 
     def value(case: np.ndarray, angle: np.ndarray) -> np.ndarray:
         checkpoint()
@@ -42,7 +46,7 @@ def count_outside(motion: Propagation, ke: np.ndarray) -> np.ndarray:
         chunk = 4000
         parts = [slice(i, i + chunk) for i in range(0, len(case), chunk)]
         return np.concatenate(
-            [determinant(motion.fundamental(case[p], ke[case[p]] * (1 / mu[p] - 1)), mu[p]) for p in parts]
+            [determinant(ready.fundamental(case[p], ke[case[p]] * (1 / mu[p] - 1)), mu[p]) for p in parts]
         )
 
     # Contact makes vibration grow most a quarter turn round the circle: what is hidden shows there first.

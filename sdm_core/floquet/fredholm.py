@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdm_core.floquet.contact_expansion import ContactExpansion
+from sdm_core.floquet.power_series import half_circle, real_series
 from sdm_core.interruption import checkpoint
 
-_SAMPLES = (16, 24, 32, 48, 64, 96, 128, 192)
+_SAMPLES = (16, 20, 24, 32, 48, 64, 96, 128, 192)
+_SHARE = 0.85  # of the terms that M has: q seldom needs fewer
 _NEGLIGIBLE = 1e-13
 _ENOUGH = 1e-11  # of the series: what its zeros are found from, before Newton's method
 _ORIGIN = 1e-3
 _RIM = (1.0, 1.2)  # of R|μ|, between which the circle for counting lies
+_SHORT = 20  # coefficients: counted apart from longer series
 _LAST_STEP = 1e-8  # of Newton's method on ln u
 _UNPOLISHED = 1e-5  # relative error of those zeros, also of double ones
 _NEAR_ONE = 1e-3  # of |ln |μ||: multipliers so near the circle are polished before they are counted
@@ -87,26 +90,31 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
     b, d = len(ke), expansion.coefficients.shape[-1]
     out = np.zeros((b, _SAMPLES[0]))
     resolved = np.zeros(b, dtype=bool)
-    todo = np.flatnonzero(expansion.resolved)
-    todo = todo[np.argsort(expansion.terms[todo], kind="stable")]  # short series together are cheap
-    one = np.eye(d)
+    waiting = np.flatnonzero(expansion.resolved)
+    fewest = np.maximum(2 * d, _SHARE * expansion.terms[waiting])
+    order = np.argsort(expansion.terms[waiting], kind="stable")  # short series together are cheap
+    waiting, fewest = waiting[order], fewest[order]
+    one, share = np.eye(d), ke / expansion.centre
     for samples in _SAMPLES:
+        todo = waiting[~resolved[waiting] & (fewest <= samples)]
         if len(todo) == 0:
-            break
-        if samples < 2 * d:
             continue
-        half = samples // 2 + 1
+        half = samples // 2
+        circle = half_circle(samples)
         found = np.empty((len(todo), samples))
         size = np.empty(len(todo))
         chunk = max(1, int(3e4 / (half * d * d)))
         for i in range(0, len(todo), chunk):
             checkpoint()
             rows = todo[i : i + chunk]
-            u = reach[rows, None] * np.exp(2j * np.pi * np.arange(half) / samples)
-            m = expansion[rows].fundamental(ke[rows, None] * (u - 1))
+            u = reach[rows, None] * circle
+            # c = K_e (u − 1), written so that places are the same for all where K_e is the centre.
+            part = share[rows, None]
+            t = circle[None] if (part == 1).all() else part * circle + (1 - part) / reach[rows, None]
+            m = expansion[rows].at(t)
             q = np.linalg.det(one - u[..., None, None] * m)
             size[i : i + chunk] = np.abs(q).max(axis=1)
-            found[i : i + chunk] = np.fft.irfft(q.conj(), samples, axis=1)
+            found[i : i + chunk] = real_series(q[:, :, None])[:, :, 0]
         tail = np.abs(found[:, -max(2, samples // 8) :]).max(axis=1)
         done = tail <= np.maximum(_NEGLIGIBLE, 30 * expansion.noise[todo]) * size
         if samples > out.shape[1]:
@@ -114,40 +122,44 @@ def _series(expansion: ContactExpansion, ke: np.ndarray, reach: np.ndarray) -> t
         done &= np.abs(found[:, 0] - 1) < _ORIGIN  # q(0) = 1, unless lost in rounding
         out[todo[done], :samples] = found[done]
         resolved[todo[done]] = True
-        todo = todo[~done]
     out[~resolved, 0] = 1.0
     return out, resolved
 
 
 def _zeros(series: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the upper half-plane with |μ| > 1/R, shape (b, l), and whether their number is right."""
-    b = len(series)
+    b, every = len(series), np.arange(len(series))
     largest = np.maximum(np.abs(series).max(axis=1), 1e-300)
     kept = np.abs(series) > _ENOUGH * largest[:, None]
     degree = series.shape[1] - 1 - np.argmax(kept[:, ::-1], axis=1)
-    roots = np.zeros((b, int(degree.max(initial=2))), dtype=complex)
     padded = 2 * ((degree + 1) // 2)
-    for d in np.unique(padded[degree > 0]):
-        rows = np.flatnonzero((padded == d) & (degree > 0))
-        coefficients = series[rows, 1 : d + 1]
-        if coefficients.shape[1] < d:
-            coefficients = np.pad(coefficients, ((0, 0), (0, d - coefficients.shape[1])))
+    roots = np.zeros((b, int(padded.max(initial=2))), dtype=complex)
+    by_degree = np.argsort(padded, kind="stable")
+    ends = np.searchsorted(padded[by_degree], np.arange(0, roots.shape[1] + 1, 2), side="right")
+    for d, start, end in zip(range(2, roots.shape[1] + 1, 2), ends[:-1], ends[1:], strict=True):
+        if start == end:
+            continue
+        rows = by_degree[start:end]
+        kept_now = series[rows, 1 : d + 1]
         companion = np.zeros((len(rows), d, d))
-        companion[:, 0] = -coefficients / series[rows, :1]
+        companion[:, 0, : kept_now.shape[1]] = -kept_now / series[rows, :1]
         companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
-        found = np.linalg.eigvals(companion)  # R μ
-        width = min(d, roots.shape[1])
-        order = np.argsort(-np.abs(found), axis=1, kind="stable")
-        roots[rows, :width] = np.take_along_axis(found, order, axis=1)[:, :width]
+        roots[rows, :d] = np.linalg.eigvals(companion)  # R μ
     modulus = np.abs(roots)
     # The circle on which zeros are counted runs through the widest gap between their moduli near the rim.
-    near = np.pad(np.clip(modulus, *_RIM), ((0, 0), (1, 1)), constant_values=_RIM[0])
-    near[:, 0] = _RIM[1]
-    near = -np.sort(-near, axis=1)
+    near = np.empty((b, roots.shape[1] + 2))
+    near[:, :2] = _RIM
+    near[:, 2:] = np.clip(modulus, *_RIM)
+    near = np.sort(near, axis=1)[:, ::-1]
     widest = np.argmax(near[:, :-1] / near[:, 1:], axis=1)
-    rows = np.arange(b)
-    rim = np.sqrt(near[rows, widest] * near[rows, widest + 1])
-    counted = _winding(series, 1.0 / rim) == (modulus > rim[:, None]).sum(axis=1)
+    rim = np.sqrt(near[every, widest] * near[every, widest + 1])
+    winding = np.empty(b, dtype=int)
+    short = padded <= _SHORT
+    for some in (short, ~short):
+        if some.any():
+            terms = min(series.shape[1], int(padded[some].max()) + 2)
+            winding[some] = _winding(series[some, :terms], 1.0 / rim[some])
+    counted = winding == (modulus > rim[:, None]).sum(axis=1)
     mu = roots / reach[:, None]
     tiny = np.abs(mu.imag) <= 1e-9 * np.abs(mu)
     mu = np.where(tiny, mu.real + 0j, mu)
@@ -180,7 +192,7 @@ def _polished(
     moved, slope, size = np.zeros(len(u)), np.ones(len(u), dtype=complex), np.ones(len(u))
     go = np.arange(len(u))
     for _ in range(4):
-        t, t_slope, scale, _ = _pencil(own[go], stiffness[go], u[go])
+        t, t_slope, scale, _ = _pencil(own if len(go) == len(u) else own[go], stiffness[go], u[go])
         x, left = null_vectors(t, scale)
         slope[go], size[go] = (left @ t_slope @ x)[:, 0, 0], scale
         with np.errstate(all="ignore"):

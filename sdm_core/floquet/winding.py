@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-_LARGEST_STEP = 0.8  # rad of phase between neighbouring points of a circle
+_LARGEST_STEP = 1.2  # rad of phase between neighbouring points of a circle
 _LARGEST_BEND = 0.7  # change of the logarithm from one interval to the next, beyond its linear course
 _MOST_POINTS = 60_000
 _NARROWEST = 1e-13  # rad
