@@ -13,6 +13,7 @@ MEASUREMENTS = {
     "convergence": "benchmarks.convergence",
     "scaling": "benchmarks.scaling",
     "maps": "benchmarks.maps",
+    "profiles": "benchmarks.profile_folder",
     "rotor37": "benchmarks.rotor_37_blade",
     "accuracy": "benchmarks.screening_accuracy",
     "speed": "benchmarks.map_speed",

@@ -24,6 +24,8 @@ FEWEST_SPEEDS, MOST_SPEEDS = 64, 2000
 # up to 1.2 times the largest K_e of interest, no tip below it hides between the speeds of a grid.
 SEARCH_MARGIN = 1.2
 SPEEDS_TO_BEGIN = 9
+# How well a grid ranks lobes: the parabola through three of its speeds misses a tip by 1 % of K_e or less.
+_RANKED_TO = 0.03
 MOST_ROUNDS = 10
 
 
@@ -235,7 +237,7 @@ def deepest_lobe_tips(
         lobes = [lobe for lobe in told if lobe.change > tolerance and np.isfinite(lobe.least)]
         asked = [lobe.finer() for lobe in lobes]
     tips = (lobe.tip(first_frequency_hz) for lobe in done + lobes if lobe.least <= ke_max)
-    return tuple(sorted(tips, key=lambda tip: tip.ke))
+    return tuple(sorted(tips, key=lambda tip: tip.ke)[:count])
 
 
 @dataclass(frozen=True)
@@ -312,7 +314,10 @@ def _still_below(period: np.ndarray, ke: np.ndarray) -> float:
 
 
 def _lowest_minima(critical_ke: np.ndarray, count: int) -> np.ndarray:
-    """Indices of the `count` lowest local minima, by the parabola through each and its neighbours."""
+    """Indices of the `count` lowest local minima, by the parabola through each and its neighbours.
+
+    More where others are so close that the grid cannot tell which are the lowest.
+    """
     ke = np.nan_to_num(critical_ke, nan=np.inf)
     walled = np.concatenate(([np.inf], ke, [np.inf]))
     left, right = walled[:-2], walled[2:]
@@ -322,4 +327,6 @@ def _lowest_minima(critical_ke: np.ndarray, count: int) -> np.ndarray:
     vertex = b.copy()
     a, b, c = a[inside], b[inside], c[inside]
     vertex[inside] = b - (a - c) ** 2 / (8 * (a + c - 2 * b))
-    return at[np.argsort(vertex, kind="stable")[:count]]
+    order = np.argsort(vertex, kind="stable")
+    close = vertex[order] <= (1 + _RANKED_TO) * vertex[order[count - 1 : count]].max(initial=-np.inf)
+    return at[order] if len(order) <= count else at[order[close]]

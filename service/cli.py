@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 
 from sdm_core.errors import InvalidInput, RubscreenError
 from sdm_core.version import __version__
-from service.commands import boundary, demo, map, models, screen, serve, train
+from service.commands import assess, blade, boundary, demo, map, models, paper, screen, serve, train
 
 
 class _Commands(TyperGroup):
@@ -55,8 +55,10 @@ def rubscreen(
     """Screen turbomachinery blades for rub-induced instability."""
 
 
-for command in (demo, serve, screen, map, boundary, train, models):
+for command in (demo, serve, screen, assess, map, boundary, train, models, paper):
     app.command(command.__name__.rpartition(".")[2])(command.run)
+
+app.add_typer(blade.app, name="blade")
 
 
 if __name__ == "__main__":

@@ -7,13 +7,24 @@ from typing import Annotated
 
 import typer
 
-from service.commands.options import OUTPUT, BladeArgument, JsonOption
+from service.commands.options import (
+    OUTPUT,
+    BladeArgument,
+    JsonOption,
+    KeMaxOption,
+    NodesOption,
+    SpeedOption,
+    WeightsOption,
+)
 
 app = typer.Typer(
     no_args_is_help=True,
     help="Make blade files from profiles or from what other programs export; check and show them.",
 )
 
+ProfileArgument = Annotated[
+    str, typer.Argument(metavar="PROFILE", help="Profile file (rubscreen/profile/1, JSON).")
+]
 OutOption = Annotated[
     str | None,
     typer.Option(
@@ -29,9 +40,7 @@ OutOption = Annotated[
 
 @app.command()
 def build(
-    profile: Annotated[
-        str, typer.Argument(metavar="PROFILE", help="Profile file (rubscreen/profile/1, JSON).")
-    ],
+    profile: ProfileArgument,
     out: OutOption = None,
     reduced: Annotated[
         str | None,
@@ -109,3 +118,51 @@ def show(blade: BladeArgument, json: JsonOption = None) -> None:
         console.print(line)
     if json:
         write_json(json, blade_to_dict(chosen), indent=True)
+
+
+@app.command()
+def sensitivities(
+    profile: ProfileArgument,
+    speed: SpeedOption = None,
+    ke_max: KeMaxOption = 2.5e4,
+    nodes: NodesOption = None,
+    weights: WeightsOption = None,
+    json: JsonOption = None,
+) -> None:
+    """How lean, sweep, stagger, thickness and chord move the least critical K_e.
+
+    The blade is built four times for each, its deepest lobe followed. Example:
+    rubscreen blade sensitivities fan.json --nodes LE,TE
+    """
+    from sdm_core.assessment import shape_sensitivities
+    from sdm_core.assessment.plain_data import plain
+    from sdm_core.blade.build import build_blade
+    from sdm_core.blade.profile import read_profile
+    from sdm_core.blade.profile.shape_change import STEPS, ShapeChange
+    from service.commands.assess_tables import sensitivities_table
+    from service.commands.inputs import contact_from, speeds_from
+    from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
+
+    check_writable(inputs=[profile], json=json)
+    chosen = read_profile(profile)
+    with progress_bar(chosen.name) as show:
+        show(0, 1, "nominal blade")
+        nominal = build_blade(chosen).blade
+        span = speeds_from(speed, nominal)
+        found = shape_sensitivities(
+            lambda values: build_blade(
+                ShapeChange.from_mapping(values).of_profile(chosen), verify=False
+            ).blade,
+            ShapeChange.nominal(),
+            STEPS,
+            contact_from(nodes, weights, None, None, nominal),
+            span,
+            ke_max,
+            progress=lambda done, total: show(done, total, "blades built"),
+        )
+    console = console_beside(json)
+    console.print(sensitivities_table(found))
+    if found.tip is not None and any(abs(found.speed_hz / end - 1) < 1e-6 for end in span):
+        console.print("at an end of the range of speeds, where frequencies move the flank of the lobe too")
+    if json:
+        write_json(json, plain(found), indent=True)

@@ -37,11 +37,14 @@ def modes_table(blade: Blade) -> Table:
 
 def about_blade(blade: Blade) -> Iterator[str]:
     """Lines on the tip, the contact direction, and what rotation does to the tip."""
-    yield f"{len(blade.tip_nodes)} tip nodes, {blade.tip_nodes[0]} to {blade.tip_nodes[-1]}, amplitudes " + {
-        "casing_normal": "normal to the casing",
-        "radial": "radial",
-        "given": "in the direction given",
-    }[blade.direction]
+    yield (
+        f"{len(blade.tip_nodes)} tip nodes, {blade.tip_nodes[0]} to {blade.tip_nodes[-1]}, amplitudes "
+        + {
+            "casing_normal": "normal to the casing",
+            "radial": "radial",
+            "given": "in the direction given",
+        }[blade.direction]
+    )
     if blade.mass_kg is not None:
         yield f"mass {blade.mass_kg:.5g} kg"
     for state in blade.states:

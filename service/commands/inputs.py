@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdm_core.assessment.margins import OperatingPoint
 from sdm_core.blade import EXAMPLES, Blade, example_blade, read_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.fourier_engagement import FourierEngagement
 from sdm_core.validation import KE_LIMIT, number
-from service.speeds import SpeedRange, evenly_spaced, operating_range
+from service.speeds import Speed, SpeedRange, evenly_spaced, operating_range
 
 if TYPE_CHECKING:
     from service.answerer import Answerer
 
 LARGEST_GRID = 4000
+# Typed for weights: all tip nodes, by quadrature along the chord.
+CHORD = "chord"
 
 
 def blade_from(text: str) -> Blade:
@@ -33,49 +36,81 @@ def blade_from(text: str) -> Blade:
 def contact_from(
     nodes: str | None, weights: str | None, arcs: str | None, engagement: str | None, blade: Blade
 ) -> ContactConfiguration:
-    """The contact as typed; without nodes or weights, the leading edge."""
+    """The contact as typed; without nodes or weights, the leading edge.
+
+    Raises
+    ------
+    InvalidInput
+        Also for a node the blade has not got.
+    """
     if nodes is not None and weights is not None:
         raise InvalidInput("--nodes", nodes, "give either --nodes or --weights, not both")
-    if weights is not None:
+    if weights == CHORD:
+        from sdm_core.contact_weights import chord_weights
+
+        chosen = dict(chord_weights(blade).weights)
+    elif weights is not None:
         chosen = _weights(weights)
     else:
-        names = [blade.tip_nodes[0]] if nodes is None else [part.strip() for part in nodes.split(",")]
-        for name in names:
-            if not name or names.count(name) > 1:
-                raise InvalidInput("--nodes", str(nodes), "name each tip node once, e.g. LE,TE")
-        chosen = dict.fromkeys(names, 1.0)
-    if arcs is not None and engagement is not None:
-        raise InvalidInput("--engagement", engagement, "give either --arcs or --engagement, not both")
-    contact = ContactConfiguration(
-        chosen,
-        None if arcs is None else _arcs(arcs),
-        None if engagement is None else _engagement(engagement),
-    )
+        chosen = {blade.tip_nodes[0]: 1.0} if nodes is None else _unit_weights(nodes)
+    contact = _contact(chosen, arcs, engagement)
     contact.weight_vector(blade.tip_nodes)
     return contact
 
 
+def _contact(weights: dict[str, float], arcs: str | None, engagement: str | None) -> ContactConfiguration:
+    """The contact as typed, for no blade in particular."""
+    if arcs is not None and engagement is not None:
+        raise InvalidInput("--engagement", engagement, "give either --arcs or --engagement, not both")
+    return ContactConfiguration(
+        weights,
+        None if arcs is None else _arcs(arcs),
+        None if engagement is None else _engagement(engagement),
+    )
+
+
 def contacts_from(
-    nodes: Sequence[str],
-    weights: Sequence[str],
-    arcs: str | None,
-    engagement: str | None,
-    blades: Sequence[Blade],
-) -> dict[str, ContactConfiguration] | None:
-    """One contact for each --nodes and --weights, by what was typed; None for the usual three."""
+    nodes: Sequence[str], weights: Sequence[str], arcs: str | None, engagement: str | None
+) -> Callable[[Blade], dict[str, ContactConfiguration]]:
+    """What gives the contacts of a blade, one for each --nodes and --weights, by what was typed.
+
+    Without either the usual three. What is wrong with the text is said here, a node that a blade has not got
+    when it is asked for.
+    """
+    from service.screening.screen import default_contacts
+
     if not nodes and not weights:
         for option, given in (("--arcs", arcs), ("--engagement", engagement)):
             if given is not None:
                 raise InvalidInput(option, given, "say which nodes too, e.g. --nodes LE --nodes TE")
-        return None
-    named = {text: contact_from(text, None, arcs, engagement, blades[0]) for text in nodes}
-    named.update({text: contact_from(None, text, arcs, engagement, blades[0]) for text in weights})
-    return named
+        return default_contacts
+    same = {text: _contact(_unit_weights(text), arcs, engagement) for text in nodes}
+    same |= {text: _contact(_weights(text), arcs, engagement) for text in weights if text != CHORD}
+
+    def of_blade(blade: Blade) -> dict[str, ContactConfiguration]:
+        named = dict(same)
+        if CHORD in weights:
+            named[CHORD] = contact_from(None, CHORD, arcs, engagement, blade)
+        for contact in named.values():
+            contact.weight_vector(blade.tip_nodes)
+        return named
+
+    return of_blade
 
 
 def speeds_from(text: str | None, blade: Blade) -> tuple[float, float]:
     """(low, high) in Hz."""
     return operating_range(blade) if text is None else SpeedRange.parse(text, "--speed").for_blade(blade)
+
+
+def operating_points(texts: Sequence[str], blade: Blade) -> list[OperatingPoint]:
+    """Operating points typed as ``16000rpm=0.6``; without a share each counts once."""
+    out = []
+    for text in texts:
+        typed, equals, share = (part.strip() for part in text.partition("="))
+        speed = Speed.parse(typed, "--point").in_hz(blade.first_frequency_hz)
+        out.append(OperatingPoint(typed, speed, _number("--point", share, text) if equals else 1.0))
+    return out
 
 
 def check_work(
@@ -161,6 +196,14 @@ def answerer_from(url: str | None, models: str | None, policy: str) -> Answerer:
     if policy == "exact":
         return Screener(None)
     return Screener.default() if models is None else Screener.default(Path(models))
+
+
+def _unit_weights(text: str) -> dict[str, float]:
+    names = [part.strip() for part in text.split(",")]
+    for name in names:
+        if not name or names.count(name) > 1:
+            raise InvalidInput("--nodes", text, "name each tip node once, e.g. LE,TE")
+    return dict.fromkeys(names, 1.0)
 
 
 def _weights(text: str) -> dict[str, float]:

@@ -48,7 +48,7 @@ WeightsOption = Annotated[
     str | None,
     typer.Option(
         metavar="LE=1[,TE=0.5...]",
-        help="Tip nodes in contact, each with its weight.",
+        help="Tip nodes in contact, each with its weight; chord: all of them, by quadrature along the chord.",
         rich_help_panel=CONTACT,
         show_default=False,
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sdm_core.blade import Blade, ModalState, blade_to_dict, example_blade, write_blade
@@ -14,7 +15,7 @@ from service.client import ServiceProblem
 from service.commands import blade_batch, inputs
 from service.commands.blade_batch import blade_paths, has_schema, load_blades
 from service.screening.batch import ranked, screen_each
-from service.screening.screen import screen
+from service.screening.screen import default_contacts, screen
 
 ROTOR = "nasa_rotor_37"
 GRID = ("--grid", "5x5")
@@ -109,7 +110,7 @@ def test_a_folder_without_blade_files_is_refused(rubscreen, answering, tmp_path)
 
 
 def test_a_blade_named_and_in_a_folder_is_read_once(folder):
-    paths = blade_paths([str(folder / "b.json"), str(folder), ROTOR, ROTOR])
+    paths = blade_paths([str(folder / "more" / ".." / "b.json"), str(folder), ROTOR, ROTOR])
     names = [text.rpartition("/")[2] for text in paths.files]
     assert names == ["b.json", "a.json", "c.json", "cut.json", "negative.json", "other.json", ROTOR]
 
@@ -143,7 +144,9 @@ def test_a_blade_that_fails_while_it_is_screened_does_not_stop_the_rest(blade, l
             return super().map(blade, *rest, **more)
 
     bad = replace(blade, name="bad")
-    report, kept, failures = screen_each([(bad, "bad.json"), (blade, "good.json")], None, Fails(), ke_max=2e4)
+    report, kept, failures = screen_each(
+        [(bad, "bad.json"), (blade, "good.json")], default_contacts, Fails(), ke_max=2e4
+    )
     assert [source for _, source in kept] == ["good.json"]
     assert {row.blade.name for row in report.results} == {blade.name}
     assert [(f.source, f.reason) for f in failures] == [("bad.json", "speed_hz = 1: ask for less")]
@@ -159,8 +162,8 @@ def test_a_service_that_is_gone_stops_the_batch(blade, lobes):
             raise ServiceProblem({"status": 422, "detail": "too many\npoints"})
 
     with pytest.raises(ServiceProblem):
-        screen_each([(blade, "x.json")], None, Gone(), ke_max=2e4)
-    report, _, failures = screen_each([(blade, "x.json")], None, Refuses(), ke_max=2e4)
+        screen_each([(blade, "x.json")], default_contacts, Gone(), ke_max=2e4)
+    report, _, failures = screen_each([(blade, "x.json")], default_contacts, Refuses(), ke_max=2e4)
     assert report is None
     assert failures[0].reason == "too many points"
 
@@ -178,7 +181,7 @@ def test_blades_screened_one_by_one_rank_as_they_do_together(blade, lobes):
 def test_progress_of_a_batch_counts_every_contact_of_every_blade(blade, lobes):
     seen = []
     blades = [(blade, "a"), (replace(blade, name="b"), "b")]
-    screen_each(blades, None, lobes, ke_max=2e4, progress=lambda *state: seen.append(state[:2]))
+    screen_each(blades, default_contacts, lobes, ke_max=2e4, progress=lambda *state: seen.append(state[:2]))
     assert seen == [(i, 6) for i in range(7)]
 
 
@@ -195,3 +198,21 @@ def test_a_loader_of_another_schema_gets_its_files_and_tells_what_it_is_at(monke
     assert [blade.name for blade in loaded.blades] == ["rotor a", "rotor b", "rotor c", "other"]
     assert "other.json: mesh" in told
     assert len(loaded.failures) == 2
+
+
+def test_weights_along_the_chord_are_each_blades_own(rubscreen, answering, tmp_path):
+    rotor = example_blade(ROTOR)
+    for name, bend in (("a", 1.0), ("b", 2.0)):
+        theta = tuple(0.02 * np.linspace(0.0, 1.0, 9) ** bend)
+        write_blade(replace(rotor, name=name, tip_theta_rad=theta), tmp_path / f"{name}.json")
+    write_blade(replace(rotor, name="c"), tmp_path / "c.json")
+    path = tmp_path / "out" / "report.json"
+    options = ["--weights", "chord", "--nodes", "LE", *GRID, "--json", str(path)]
+    result = rubscreen("screen", str(tmp_path), *options)
+    assert result.exit_code == 0, result.output
+    report = json.loads(path.read_text())
+    rows = [row for row in report["results"] if row["contact_name"] == "chord"]
+    first, second = (row["contact"]["weights"] for row in rows)
+    assert len(first) == len(second) == 9
+    assert first != second
+    assert "tip_theta_rad" in report["failures"][0]["reason"]  # the third does not say where its nodes are

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,7 +107,7 @@ def test_the_axis_is_the_papers_where_the_lobes_show_on_it():
 @pytest.mark.parametrize(("low", "high"), [(0.31, 0.72), (0.522, 0.541)])
 def test_an_unstable_stretch_is_found_also_between_the_stiffnesses_looked_at(low, high):
     found = unstable_intervals(lambda ke: (ke - low) * (high - ke), 1.0)
-    assert np.allclose(found, [(low, high)], atol=2e-4)
+    assert np.allclose(found, [(low, high)], atol=4e-4)
 
 
 def test_lobes_of_fixed_steps_are_where_the_dense_method_of_the_paper_crosses():
@@ -126,15 +125,23 @@ def test_lobes_of_fixed_steps_are_where_the_dense_method_of_the_paper_crosses():
 
 
 def test_errors_of_lobes_have_the_sign_of_the_unsafe_side():
-    ratio = np.linspace(0.21, 0.49, 57)
-    exact = Lobes("", ratio, tuple(((100.0, 1000.0),) for _ in ratio), ke_max=1000.0)
-    high = replace(exact, unstable_ke=tuple(((110.0, 1000.0),) for _ in ratio))
-    blind = replace(exact, unstable_ke=tuple(((110.0, 1000.0),) if x > 0.34 else () for x in ratio))
-    assert lobe_errors(high, exact).error == pytest.approx(0.1)
-    assert np.isinf(lobe_errors(blind, exact).error).any()
-    assert lobe_errors(exact, exact).superimposed_from() == pytest.approx(
-        lobe_errors(exact, exact).ratio.min()
-    )
+    ratio = np.linspace(0.2, 0.5, 61)
+
+    def lobes(deep: float, shallow: float) -> Lobes:
+        """Two lobes, tips at 0.3 and 0.4, that meet at 0.35."""
+        depth = np.where(ratio < 0.35, shallow, deep)
+        first = depth + 1e5 * np.minimum(np.abs(ratio - 0.3), np.abs(ratio - 0.4))
+        return Lobes("", ratio, tuple(((ke, 2e4),) if ke < 2e4 else () for ke in first), ke_max=2e4)
+
+    exact = lobes(1000.0, 2000.0)
+    wrong = lobe_errors(lobes(1030.0, 2400.0), exact)
+    assert wrong.ratio.tolist() == pytest.approx([0.4, 0.3])
+    assert wrong.error.tolist() == pytest.approx([0.03, 0.2])
+    assert wrong.superimposed_from() == pytest.approx(0.4)
+    assert wrong.worst(0.2, 0.5) == (pytest.approx(0.2), pytest.approx(0.3))
+    assert lobe_errors(lobes(900.0, 2000.0), exact).error[0] == pytest.approx(-0.1)
+    assert lobe_errors(lobes(1000.0, 3e4), exact).error[1] > 1
+    assert lobe_errors(exact, exact).superimposed_from() == pytest.approx(0.3)
 
 
 def test_coarse_steps_err_on_the_unsafe_side_and_finer_ones_less(narrow):
@@ -197,7 +204,7 @@ def test_bending_or_torsion_comes_first_as_the_amplitudes_say(narrow):
     ("example", "stable"), [("nasa_rotor_37", False), ("generic_compressor_blade", True)]
 )
 def test_the_papers_upper_test_point_is_judged_by_the_exact_core(narrow, example, stable):
-    """Rotor 37 is unstable at 2e4 N/m as the paper's blade is; the generic one has its floor at 21,600 N/m."""
+    """Rotor 37 is unstable at 2e4 N/m as the paper's blade is; the generic one's floor is 21,600 N/m."""
     figure = stability_diagram(study_of(example_blade(example)))
     lower, upper = figure.marks
     assert lower.stable is True

@@ -34,9 +34,7 @@ def calculix_deck(model: SolidModel, speed_hz: float = 0.0, modes: int = 5) -> s
     """
     material = model.material
     lines = ["*NODE, NSET=NALL"]
-    lines += [
-        f"{i}, {x:.13e}, {y:.13e}, {z:.13e}" for i, (x, y, z) in enumerate(model.mesh.position_m, 1)
-    ]
+    lines += [f"{i}, {x:.13e}, {y:.13e}, {z:.13e}" for i, (x, y, z) in enumerate(model.mesh.position_m, 1)]
     lines += ["*ELEMENT, TYPE=C3D20, ELSET=EALL"]
     for i, nodes in enumerate(_elements(model) + 1, 1):
         row = [i, *nodes.tolist()]

@@ -12,6 +12,9 @@ from sdm_core.blade.profile.blade_profile import BladeProfile
 from sdm_core.blade.profile.sections import SectionTable
 from sdm_core.validation import number
 
+# Of the differences that give derivatives: small against what bends K_e, large against the rounding of modes.
+STEPS = {"lean_deg": 0.2, "sweep_deg": 0.2, "stagger_deg": 0.2, "thickness": 0.01, "chord": 0.01}
+
 
 @dataclass(frozen=True)
 class ShapeChange:

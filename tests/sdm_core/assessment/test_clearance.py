@@ -18,7 +18,7 @@ SPEEDS = (0.0, 150.0, 300.0)
 
 
 def growing(amplitude: float = 2.0) -> Blade:
-    """One mode: the tip moves 0.3, −0.4, 0 in contact direction, of a vector up to 1 long, times `amplitude`."""
+    """One mode: the tip moves 0.3, −0.4, 0 in contact direction, of a vector up to 1 long."""
     radial = np.array([[0.3, -0.4, 0.0]])
     tangential, axial = np.array([[0.4, 0.3, 0.6]]), np.array([[0.0, 0.5, 0.8]])
     states = [

@@ -34,10 +34,10 @@ def test_rotor_37_is_safer_at_its_trailing_edge_and_every_node_is_searched_as_by
     assert [alone.node for alone in found.nodes] == list(blade.tip_nodes)
     for alone in (found.leading, found.trailing):
         there = ContactConfiguration.at(alone.node)
-        own = least_critical_ke(blade, there, 150.0, 300.0, alone.searched_ke, count=1)[0]
+        own = least_critical_ke(blade, there, 150.0, 300.0, alone.searched_ke, count=100)[0]
         assert alone.tip.ke == pytest.approx(own.ke, rel=1e-9)
-        # Modes far apart do each other little: the deepest lobe stands near the least of their floors.
-        assert alone.tip.ke == pytest.approx(min(alone.mode_floor_ke), rel=0.05)
+        # Modes far apart do each other little, and no lobe's tip falls just where a floor is least.
+        assert 0.99 < alone.tip.ke / min(alone.mode_floor_ke) < 1.1
 
 
 def test_an_edge_that_does_not_move_is_safer_and_no_ratio_is_made_up():

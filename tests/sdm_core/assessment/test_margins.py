@@ -17,7 +17,7 @@ RANGE = (150.0, 300.0)
 
 
 def one_mode_edges(blade_hz: float, damping: float, kappa: float, lobe: int) -> tuple[float, float]:
-    """Speeds between which one mode is unstable: K_e = −1/(2 Re H) at two frequencies, each with its phase."""
+    """Speeds between which one mode is unstable: K_e = −1/(2 Re H) has two frequencies."""
     # With s = ω²/ω_0² and k = K_e G/ω_0²: (1 − s)² + 4ξ²s = −2k(1 − s).
     roots = np.sort(np.roots([1.0, 4 * damping**2 - 2 - 2 * kappa, 1 + 2 * kappa]).real)
     speeds = []
@@ -72,6 +72,26 @@ def test_a_lobe_that_only_just_reaches_the_liner_is_not_passed_by():
     assert len(just_above.unstable) == 1
     assert just_above.unstable[0].high_hz - just_above.unstable[0].low_hz < 0.02
     assert margins(blade, LE, (230.0, 255.0), tip.ke * (1 - 1e-3)).unstable == ()
+
+
+def test_stable_gaps_between_lobes_are_found_whatever_the_range_looked_at():
+    """The same speeds, seen from two ranges with other grids: the same intervals."""
+    blade, liner = example_blade("nasa_rotor_37"), 9000.0
+    one = margins(blade, LE, (60.0, 300.0), liner).unstable
+    other = margins(blade, LE, (60.0, 300.8), liner).unstable
+    edges = [[(i.low_hz, i.high_hz) for i in found] for found in (one, other)]
+    assert len(edges[0]) > 20
+    np.testing.assert_allclose(edges[0], edges[1], rtol=3e-6)
+
+
+def test_the_ends_of_the_range_know_their_nearest_unstable_speed():
+    found = margins(example_blade("nasa_rotor_37"), LE, (245.0, 290.0), 9500.0)
+    assert found.low_end_hz == pytest.approx(found.unstable[0].low_hz - 245.0)
+    assert found.high_end_hz == pytest.approx(290.0 - found.unstable[-1].high_hz)
+    assert len(found.unstable) == 1 and found.low_end_hz > 0 and found.high_end_hz > 0
+    cut = margins(example_blade("nasa_rotor_37"), LE, (241.6, 267.1), 9500.0)
+    assert cut.low_end_hz == 0.0 and cut.high_end_hz == 0.0
+    assert cut.unstable[0].open_low and cut.unstable[-1].open_high
 
 
 def test_operating_points_tell_stability_distance_and_share_of_time():

@@ -91,10 +91,10 @@ def test_all_modes_kept_is_the_same_blade_and_one_dropped_is_not():
     same = boundary(with_modes(blade, [1, 2, 3, 4, 5]), LE, speed, 2.5e4, truncation=False).critical_ke
     other = boundary(with_modes(blade, [1, 3, 4, 5]), LE, speed, 2.5e4, truncation=False).critical_ke
     np.testing.assert_array_equal(whole, same)
-    # Near 241 Hz the second mode's lobe is the only one below 25,000 N/m.
+    # Near 242 Hz the second mode's lobe is by far the deepest.
     at = int(np.argmin(np.abs(speed - 242.0)))
     assert whole[at] < 1e4
-    assert np.isnan(other[at])
+    assert other[at] > 1.5 * whole[at]
     assert mode_alone(blade, 2).damping_ratio.shape == (1,)
 
 

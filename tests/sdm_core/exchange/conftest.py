@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy import linalg
@@ -10,6 +12,7 @@ from scipy.sparse import csc_array, lil_array
 from sdm_core.blade import Blade
 from sdm_core.blade.matrix_model import DofMap, MatrixModel, SpeedState
 from sdm_core.blade.tip_line import TipLine
+from sdm_core.errors import InvalidInput
 
 E, NU, RHO = 108e9, 0.34, 4400.0
 LENGTH, WIDTH, THICKNESS, HUB = 0.06, 0.02, 0.003, 0.15
@@ -155,3 +158,21 @@ def blade(full_model: MatrixModel, tip: TipLine) -> Blade:
         design_speed_hz=180.0,
         material={"rho": RHO, "E": E},
     )
+
+
+@pytest.fixture
+def refused(capfd: pytest.CaptureFixture[str]) -> Callable[..., InvalidInput]:
+    """Reads files that must be refused: one error that says all the words, and nothing printed."""
+
+    def check(read: Callable, files, *words: str) -> InvalidInput:
+        with pytest.raises(InvalidInput) as caught:
+            read(files)
+        text = str(caught.value)
+        for word in words:
+            assert word in text, text
+        assert caught.value.remedy
+        assert len(text) < 600
+        assert capfd.readouterr() == ("", "")
+        return caught.value
+
+    return check

@@ -12,7 +12,7 @@ from scipy.io import savemat
 from scipy.sparse import issparse
 
 from sdm_core.blade.exchange import export_blade, read_matrix_model, read_modal, write_model
-from sdm_core.blade.exchange.mat import model_tree
+from sdm_core.blade.exchange.content import arrays_of_model
 from sdm_core.errors import InvalidInput
 
 TRIALS = 60
@@ -85,7 +85,7 @@ def test_models_of_matrices(name, full_model, reduced_model, tmp_path, capfd):
     model = full_model if name == "calculix" else reduced_model
     path = tmp_path / f"model{MODELS[name]}"
     if name == "mat-v6":
-        savemat(path, model_tree(model))
+        savemat(path, arrays_of_model(model))
         paths: tuple[Path, ...] = (path,)
     else:
         paths = write_model(model, path, format=name).paths

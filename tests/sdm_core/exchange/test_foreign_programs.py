@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import linalg
 from scipy.io import loadmat, mmwrite, savemat
 from scipy.sparse import csc_array, issparse
 
 from sdm_core.blade.exchange import export_blade, read_matrix_model, read_modal, write_model
 from sdm_core.blade.exchange.dmig import read_dmig
 from sdm_core.blade.exchange.op4 import read_op4
+from sdm_core.blade.matrix_model import SpeedState
 from sdm_core.blade.tip_line import TipLine
 from sdm_core.errors import InvalidInput
 
@@ -111,6 +115,59 @@ def test_bulk_data_in_small_free_and_large_fields_say_the_same(tmp_path):
         assert np.array_equal(dense(content.matrices["KAAX"]), [[2500.0, -1.5], [-1.5, 4.0]])
         assert content.positions == {11: (1.5, -0.2, 0.25), 12: (2.5, 0.0, 10.0)}
         assert (content.dofs.node.tolist(), content.dofs.component.tolist()) == ([11, 12], [1, 3])
+
+
+@pytest.mark.parametrize("kind", ["CORD2R", "CORD2C", "CORD2S"])
+def test_nodes_in_systems_of_their_own_are_turned_to_x_y_z(kind, full_model, tip, tmp_path):
+    """The same beam with places and displacements along a system that is shifted and turned."""
+    origin = np.array([0.02, -0.01, -0.3])
+    a, b = origin, origin + np.array([0.1, 0.0, 1.0])
+    c = origin + np.array([1.0, 0.5, 0.0])
+    e3 = (b - a) / np.linalg.norm(b - a)
+    e2 = np.cross(e3, c - a) / np.linalg.norm(np.cross(e3, c - a))
+    axes = np.column_stack((np.cross(e2, e3), e2, e3))
+    points, rotations = {}, []
+    for node, place in full_model.node_position_m.items():
+        x, y, z = axes.T @ (np.array(place) - origin)
+        rho, r = np.hypot(x, y), np.linalg.norm((x, y, z))
+        theta = np.degrees(np.arctan2(y, x))
+        if kind == "CORD2R":
+            points[node], local = (x, y, z), np.eye(3)
+        elif kind == "CORD2C":
+            points[node] = (rho, theta, z)
+            local = np.array([[x / rho, -y / rho, 0], [y / rho, x / rho, 0], [0, 0, 1]])
+        else:
+            points[node] = (r, np.degrees(np.arctan2(rho, z)), theta)
+            out, around = np.array([x, y, z]) / r, np.array([-y, x, 0]) / rho
+            local = np.column_stack((out, np.cross(around, out), around))
+        if node in set(full_model.dofs.node.tolist()):
+            rotations.append(axes @ local)
+    turn = linalg.block_diag(*rotations)
+
+    def along(matrix) -> np.ndarray:
+        turned = turn.T @ dense(matrix) @ turn
+        return (turned + turned.T) / 2
+
+    states = (SpeedState(0.0, along(full_model.states[0].stiffness)),)
+    path = write_model(
+        replace(full_model, mass=along(full_model.mass), states=states, node_position_m={}),
+        tmp_path / "a.bdf",
+    ).paths[0]
+    cards = (
+        f"{kind},3,0," + ",".join(f"{v:.17g}" for v in (*a, *b)) + "\n," + ",".join(f"{v:.17g}" for v in c)
+    )
+    cards += "".join(f"\nGRID,{n},3,{p[0]:.17g},{p[1]:.17g},{p[2]:.17g},3" for n, p in points.items())
+    cards += "\nGRID,99999,7,0.,0.,0.\n"  # of no matrix, in a system that is not here
+    path.write_text(path.read_text().replace("BEGIN BULK\n", "BEGIN BULK\n" + cards))
+    found = read_matrix_model(path, tip_nodes=tip.nodes)
+    scale = abs(full_model.states[0].stiffness).max()
+    assert abs(dense(found.model.states[0].stiffness) - full_model.states[0].stiffness).max() < 1e-12 * scale
+    for node, place in full_model.node_position_m.items():
+        assert found.model.node_position_m[node] == pytest.approx(place, abs=1e-14)
+    assert any("48 nodes turned" in str(item) for item in found.findings.items)
+    path.write_text(path.read_text().replace(f"{kind},3,", f"{kind},4,"))
+    with pytest.raises(InvalidInput, match="system 3"):
+        read_matrix_model(path)
 
 
 def test_another_library_reads_our_universal_file(blade, tmp_path):
