@@ -150,9 +150,9 @@ def sensitivities(
         nominal = build_blade(chosen).blade
         span = speeds_from(speed, nominal)
         found = shape_sensitivities(
-            lambda values: build_blade(
-                ShapeChange.from_mapping(values).of_profile(chosen), verify=False
-            ).blade,
+            lambda values: (
+                build_blade(ShapeChange.from_mapping(values).of_profile(chosen), verify=False).blade
+            ),
             ShapeChange.nominal(),
             STEPS,
             contact_from(nodes, weights, None, None, nominal),

@@ -1,4 +1,4 @@
-"""Blades from files and whole folders, each read by what its file holds."""
+"""Blades from files and whole folders: blade files read, profiles built."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sdm_core.blade import EXAMPLES, Blade, read_blade
+from sdm_core.blade import EXAMPLES, Blade
 from sdm_core.blade.blade_file import LARGEST_FILE_BYTES
+from sdm_core.blade.build_batch import build_each
+from sdm_core.blade.profile import SCHEMA as PROFILE_SCHEMA
+from sdm_core.blade.profile import BladeProfile, read_profile
 from sdm_core.errors import InvalidInput, RubscreenError
 from service.commands.inputs import blade_from
 from service.screening.batch import Failure
@@ -16,11 +19,6 @@ from service.screening.batch import Failure
 SUFFIX = ".json"
 
 Progress = Callable[[int, int, str], None]
-Tell = Callable[[str], None]
-Detector = Callable[[Path, str | None], bool]
-"""Whether a loader is for this file, from its path and the ``schema`` it names (None: none to be read)."""
-Loader = Callable[[Path, Tell], Blade]
-"""A blade from a file; it may tell what it is at, for loaders that take minutes."""
 
 
 @dataclass(frozen=True)
@@ -97,45 +95,46 @@ def blade_paths(texts: Sequence[str]) -> BladePaths:
 
 
 def load_blades(paths: BladePaths, progress: Progress = lambda *_: None) -> LoadedBlades:
-    """Read every file; one that cannot be read is a failure, unless it was named alone.
+    """Read every file and build every profile; one that cannot be is a failure, unless it was named alone.
+
+    Profiles are built on all cores.
 
     Raises
     ------
     RubscreenError
         What is wrong with a file that was named alone.
     """
-    blades, sources, failures = [], [], []
+    found: dict[str, Blade | RubscreenError] = {}
+    profiles: dict[str, BladeProfile] = {}
     for i, text in enumerate(paths.files):
-
-        def tell(what: str, i: int = i, name: str = Path(text).name) -> None:
-            progress(i, len(paths.files), f"{name}: {what}" if what else name)
-
-        tell("")
+        progress(i, len(paths.files), Path(text).name)
         try:
-            blades.append(_loaded(text, tell))
-            sources.append(text)
+            if Path(text).exists() and schema_of(Path(text)) == PROFILE_SCHEMA:
+                profiles[text] = read_profile(text)
+            else:
+                found[text] = blade_from(text)
         except RubscreenError as error:
-            if paths.alone:
-                raise
-            failures.append(Failure.of(text, error))
+            found[text] = error
+    if profiles:
+
+        def built(done: int, total: int, name: str) -> None:
+            progress(done, total, f"built {name}")
+
+        progress(0, len(profiles), "building profiles")
+        for text, made in zip(profiles, build_each(list(profiles.values()), progress=built), strict=True):
+            found[text] = made if isinstance(made, RubscreenError) else made.blade
+    blades, sources, failures = [], [], []
+    for text in paths.files:
+        blade = found[text]
+        if isinstance(blade, Blade):
+            blades.append(blade)
+            sources.append(text)
+        elif paths.alone:
+            raise blade
+        else:
+            failures.append(Failure.of(text, blade))
     progress(len(paths.files), len(paths.files), "read")
     return LoadedBlades(tuple(blades), tuple(sources), tuple(failures), paths.ignored)
-
-
-def has_schema(name: str) -> Detector:
-    """A detector of files that name a schema."""
-    return lambda path, schema: schema == name
-
-
-def _loaded(text: str, tell: Tell) -> Blade:
-    if text in EXAMPLES and not Path(text).exists():
-        return blade_from(text)
-    path = Path(text)
-    schema = schema_of(path)
-    for detector, loader in LOADERS:
-        if detector(path, schema):
-            return loader(path, tell)
-    return blade_from(text)
 
 
 def schema_of(path: Path) -> str | None:
@@ -163,11 +162,3 @@ def _opened(folder: str) -> tuple[list[str], list[str]]:
 
 def _identity(text: str) -> str:
     return str(Path(text).resolve()) if Path(text).exists() else text
-
-
-def _read_blade(path: Path, _: Tell) -> Blade:
-    return read_blade(path)
-
-
-# Asked in this order; whatever none is for is taken for a blade file, whose reader says what is wrong.
-LOADERS: tuple[tuple[Detector, Loader], ...] = ((has_schema("rubscreen/blade/1"), _read_blade),)

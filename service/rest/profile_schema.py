@@ -81,7 +81,10 @@ PROFILE: Json = _object(
         "parametric": _PARAMETRIC,
         "sections": _SECTIONS,
         "stacking": {"enum": list(STACKINGS), "description": "Of sections; left out: as given."},
-        "edge_cut": {"type": "number", "description": "Of sections: share of the chord cut off at each edge."},
+        "edge_cut": {
+            "type": "number",
+            "description": "Of sections: share of chord cut off each edge.",
+        },
         "design_speed_hz": {"type": "number", "exclusiveMinimum": 0},
         "material": {
             "type": "object",

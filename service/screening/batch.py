@@ -6,14 +6,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import Cancelled, InvalidInput, RubscreenError
 from service.answerer import Answerer
 from service.client import ServiceProblem
-from service.screening.screen import ScreeningReport, ScreeningResult, screen
+from service.screening.screen import ScreeningReport, ScreeningResult, risk, screen
 from service.screening.sweep import Progress
 from service.speeds import SpeedRange
 
@@ -143,12 +141,8 @@ def screen_each(
 def ranked(reports: Iterable[ScreeningReport]) -> ScreeningReport:
     """Several reports as one, safest first, in the order of `ScreeningReport`."""
     every = list(reports)
-    results = sorted((row for report in every for row in report.results), key=_risk)
+    results = sorted((row for report in every for row in report.results), key=risk)
     return ScreeningReport(tuple(results), every[0].model, every[0].solver)
-
-
-def _risk(row: ScreeningResult) -> tuple[float, float]:
-    return -(np.inf if row.worst is None else row.worst.ke), row.unstable_share
 
 
 def _unreachable(error: RubscreenError) -> bool:

@@ -222,7 +222,7 @@ def screen(
         )
     if progress is not None:
         progress(len(jobs), len(jobs), "done")
-    ranked = tuple(sorted(results, key=_risk))
+    ranked = tuple(sorted(results, key=risk))
     return ScreeningReport(ranked, results[0].map.model, results[0].boundary.solver)
 
 
@@ -230,6 +230,7 @@ def _range(blade: Blade, speed_range: SpeedRange | None) -> tuple[float, float]:
     return operating_range(blade) if speed_range is None else speed_range.for_blade(blade)
 
 
-def _risk(result: ScreeningResult) -> tuple[float, float]:
+def risk(result: ScreeningResult) -> tuple[float, float]:
+    """Safest first, as a key for sorting: largest least K_e, then the smaller unstable share."""
     smallest = np.inf if result.worst is None else result.worst.ke
     return -smallest, result.unstable_share

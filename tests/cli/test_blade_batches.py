@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from named_solids import coarse_blade
 
 from sdm_core.blade import Blade, ModalState, blade_to_dict, example_blade, write_blade
+from sdm_core.blade.profile import profile_to_dict
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from service.client import ServiceProblem
-from service.commands import blade_batch, inputs
-from service.commands.blade_batch import blade_paths, has_schema, load_blades
+from service.commands import inputs
+from service.commands.blade_batch import blade_paths, load_blades
 from service.screening.batch import ranked, screen_each
 from service.screening.screen import default_contacts, screen
 
@@ -185,19 +187,18 @@ def test_progress_of_a_batch_counts_every_contact_of_every_blade(blade, lobes):
     assert seen == [(i, 6) for i in range(7)]
 
 
-def test_a_loader_of_another_schema_gets_its_files_and_tells_what_it_is_at(monkeypatch, folder):
-    made = example_blade("generic_compressor_blade")
-
-    def load(path, tell):
-        tell("mesh")
-        return replace(made, name=path.stem)
-
-    monkeypatch.setattr(blade_batch, "LOADERS", ((has_schema("someone/else/7"), load), *blade_batch.LOADERS))
-    told = []
-    loaded = load_blades(blade_paths([str(folder)]), lambda done, total, text: told.append(text))
-    assert [blade.name for blade in loaded.blades] == ["rotor a", "rotor b", "rotor c", "other"]
-    assert "other.json: mesh" in told
-    assert len(loaded.failures) == 2
+def test_profiles_of_a_folder_are_built_and_impossible_ones_named(tmp_path):
+    (tmp_path / "good.json").write_text(json.dumps(profile_to_dict(coarse_blade("good"))))
+    impossible = profile_to_dict(coarse_blade("impossible"))
+    impossible["parametric"]["stagger_deg"] = [20.0, 84.0]
+    (tmp_path / "impossible.json").write_text(json.dumps(impossible))
+    said = []
+    loaded = load_blades(blade_paths([str(tmp_path)]), lambda done, total, what: said.append(what))
+    assert [blade.name for blade in loaded.blades] == ["good"]
+    (failure,) = loaded.failures
+    assert "impossible.json" in failure.source
+    assert "stagger_deg" in failure.reason
+    assert "built good" in said
 
 
 def test_weights_along_the_chord_are_each_blades_own(rubscreen, answering, tmp_path):
