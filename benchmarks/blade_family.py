@@ -38,7 +38,7 @@ def random_profile(rng: np.random.Generator, name: str, mesh: Subdivision = COAR
 def impossible_profiles(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
     """Three shapes no blade can have, as profile documents by name: an edge that runs backwards, sides that
     change places, a material in GPa."""
-    backwards, crossing, soft = (profile_to_dict(random_profile(rng, "")) for _ in range(3))
+    backwards, crossing, soft = (profile_to_dict(random_profile(rng, "impossible")) for _ in range(3))
     backwards["parametric"]["stagger_deg"] = [20.0, 84.0]
     z = np.linspace(0.0, 0.03, 11).tolist()
     half = (0.01, 0.003, -0.01)

@@ -8,11 +8,10 @@ from typing import Literal
 import numpy as np
 
 from sdm_core.blade.solid_mesh import SolidMesh
-from sdm_core.blade.tip_line import TipLine, cylindrical_frames
+from sdm_core.blade.tip_line import Direction, TipLine, checked_direction
 from sdm_core.errors import InvalidInput
-from sdm_core.validation import number, vector
+from sdm_core.validation import number
 
-_AXIS = np.array([0.0, 0.0, 1.0])
 LINES = ("middle", "pressure", "suction")
 
 
@@ -35,7 +34,7 @@ class TipContact:
 
     nodes: int = 9
     line: Literal["middle", "pressure", "suction"] = "middle"
-    direction: str | tuple[float, float, float] = "casing_normal"
+    direction: Direction = "casing_normal"
     casing_slope: float | None = None
 
     def __post_init__(self) -> None:
@@ -43,20 +42,7 @@ class TipContact:
             raise InvalidInput("tip.nodes", self.nodes, "give a whole number of nodes from 2 to 201")
         if self.line not in LINES:
             raise InvalidInput("tip.line", self.line, f"give one of {', '.join(LINES)}")
-        if isinstance(self.direction, str):
-            if self.direction not in ("casing_normal", "radial"):
-                raise InvalidInput(
-                    "tip.direction",
-                    self.direction,
-                    "give casing_normal, radial, or three numbers (radial, tangential, axial)",
-                )
-        else:
-            given = vector("tip.direction", self.direction, -1e6, 1e6, "")
-            if len(given) != 3 or not given.any():
-                raise InvalidInput(
-                    "tip.direction", self.direction, "give (radial, tangential, axial), not zero"
-                )
-            object.__setattr__(self, "direction", tuple(float(x) for x in given))
+        object.__setattr__(self, "direction", checked_direction(self.direction))
         if self.casing_slope is not None:
             number("tip.casing_slope", self.casing_slope, -10.0, 10.0, "")
 
@@ -76,18 +62,9 @@ class TipContact:
             When the mesh has too few nodes along the chord.
         """
         nodes = self._nodes(mesh, suction_side)
-        place = mesh.position_m[nodes]
-        frames = cylindrical_frames(place, _AXIS)
-        if self.direction == "radial":
-            towards, name = frames[:, 0], "radial"
-        elif self.direction == "casing_normal":
-            slope = casing_slope if self.casing_slope is None else self.casing_slope
-            slopes = _tip_slope(place) if slope is None else np.full(len(place), slope)
-            towards, name = frames[:, 0] - slopes[:, None] * frames[:, 2], "casing_normal"
-        else:
-            towards, name = np.einsum("k,rkx->rx", np.array(self.direction), frames), "given"
         names = ["LE", *(f"N{i}" for i in range(2, self.nodes)), "TE"]
-        return TipLine(names, nodes, towards, name)
+        slope = casing_slope if self.casing_slope is None else self.casing_slope
+        return TipLine.along(names, nodes, mesh.position_m[nodes], self.direction, casing_slope=slope)
 
     def _nodes(self, mesh: SolidMesh, suction_side: int) -> list[int]:
         chord, span, thickness = 2 * np.array(
@@ -109,13 +86,3 @@ class TipContact:
         at = step * np.rint(np.linspace(0, there, self.nodes)).astype(int)
         found = [mesh.node_at(int(i), int(span), int(layer)) for i in at]
         return [node for node in found if node is not None]
-
-
-def _tip_slope(place: np.ndarray) -> np.ndarray:
-    """dr/dz of the tip at its nodes, by a cubic through its meridional line, shape (r,)."""
-    z, radius = place[:, 2], np.hypot(place[:, 0], place[:, 1])
-    chord = np.linalg.norm(place[-1] - place[0])
-    if np.ptp(z) < 1e-2 * chord:  # the chord runs along the circumference: it says nothing of dr/dz
-        return np.zeros(len(place))
-    fit = np.polynomial.Polynomial.fit(z, radius, min(3, len(place) - 1))
-    return fit.deriv()(z)

@@ -9,6 +9,11 @@ import numpy as np
 
 from sdm_core.blade.modal import DIRECTIONS
 from sdm_core.errors import InvalidInput
+from sdm_core.validation import vector
+
+# Contact direction: by name, or as parts (radial, tangential, axial).
+Direction = str | tuple[float, float, float]
+_Z = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,76 @@ class TipLine:
         if direction not in DIRECTIONS:
             raise InvalidInput("tip.direction", direction, f"give one of {', '.join(DIRECTIONS)}")
         put(self, "direction", direction)
+
+    @classmethod
+    def along(
+        cls,
+        names: Sequence[str],
+        nodes: Sequence[int],
+        position_m: np.ndarray,
+        direction: Direction = "casing_normal",
+        *,
+        casing_slope: float | None = None,
+        rotation_axis: Sequence[float] = _Z,
+    ) -> TipLine:
+        """Nodes at places, their directions from the shape of the tip.
+
+        Parameters
+        ----------
+        position_m
+            Places of the nodes, leading to trailing edge, m, shape (r, 3).
+        direction
+            ``casing_normal``, ``radial``, or (radial, tangential, axial).
+        casing_slope
+            dr/dz of the casing; None: that of the tip itself at each node.
+        rotation_axis
+            Through the origin, pointing downstream.
+        """
+        axis = np.array(rotation_axis, dtype=float)
+        frames = cylindrical_frames(position_m, axis)
+        towards = checked_direction(direction)
+        if isinstance(towards, tuple):
+            return cls(names, nodes, np.einsum("k,rkx->rx", np.array(towards), frames), "given")
+        if towards == "radial":
+            return cls(names, nodes, frames[:, 0], "radial")
+        slopes = np.full(len(frames), 0.0 if casing_slope is None else casing_slope)
+        if casing_slope is None:
+            slopes = _tip_slope(
+                position_m @ axis, np.einsum("rx,rx->r", position_m, frames[:, 0]), position_m
+            )
+        return cls(names, nodes, frames[:, 0] - slopes[:, None] * frames[:, 2], "casing_normal")
+
+
+def checked_direction(direction: Direction) -> Direction:
+    """A contact direction that can be used.
+
+    Raises
+    ------
+    InvalidInput
+        For another name, or three numbers that are all zero.
+    """
+    if isinstance(direction, str):
+        if direction not in ("casing_normal", "radial"):
+            raise InvalidInput(
+                "tip.direction",
+                direction,
+                "give casing_normal, radial, or three numbers (radial, tangential, axial)",
+            )
+        return direction
+    given = vector("tip.direction", direction, -1e6, 1e6, "")
+    if len(given) != 3 or not given.any():
+        raise InvalidInput("tip.direction", list(given), "give (radial, tangential, axial), not zero")
+    return float(given[0]), float(given[1]), float(given[2])
+
+
+def _tip_slope(z: np.ndarray, radius: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """dr/dz of the tip at its nodes, by a cubic through its meridional line, shape (r,)."""
+    chord = np.linalg.norm(place[-1] - place[0])
+    # One node, or a chord along the circumference, says nothing of dr/dz.
+    if len(z) < 2 or np.ptp(z) < 1e-2 * chord:
+        return np.zeros(len(z))
+    fit = np.polynomial.Polynomial.fit(z, radius, min(3, len(z) - 1))
+    return fit.deriv()(z)
 
 
 def cylindrical_frames(position_m: np.ndarray, rotation_axis: np.ndarray) -> np.ndarray:

@@ -36,6 +36,34 @@ OutOption = Annotated[
         show_default=False,
     ),
 ]
+FilesArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="FILES...", help="One or more files; SPEED_HZ=FILE for modal data at speeds."),
+]
+FormatOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Format, where the ending does not say.", show_default=False),
+]
+ModalOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--modal/--matrices", help="What the files hold, where it cannot be told.", show_default=False
+    ),
+]
+StiffnessOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="K|0=K0,200=K1", help="Name of the stiffness, or one a rotor speed.", show_default=False
+    ),
+]
+MassOption = Annotated[str | None, typer.Option(metavar="M", help="Name of the mass.", show_default=False)]
+UnitsOption = Annotated[str, typer.Option(metavar="SI|mm-t-s", help="Of the files; never guessed.")]
+AxisOption = Annotated[
+    str | None, typer.Option(metavar="X,Y,Z", help="Rotation axis, through the origin.", show_default=False)
+]
+NormalisedOption = Annotated[
+    bool, typer.Option("--mass-normalised", help="Modes without modal masses are mass-normalised.")
+]
 
 
 @app.command()
@@ -97,6 +125,140 @@ def build(
     for line in (*about_blade(made.blade), *about_build(made)):
         console.print(line)
     console.print(f"written to {target}")
+
+
+@app.command("import")
+def import_(
+    files: FilesArgument,
+    out: OutOption = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            metavar="101,105,...", help="Contact nodes, leading to trailing edge.", show_default=False
+        ),
+    ] = None,
+    names: Annotated[
+        str | None,
+        typer.Option(metavar="LE,MID,TE", help="Their names; left out: LE, N2, ... TE.", show_default=False),
+    ] = None,
+    direction: Annotated[
+        str,
+        typer.Option(
+            metavar="casing_normal|radial|R,T,A",
+            help="Contact direction, or its radial, tangential, axial parts.",
+        ),
+    ] = "casing_normal",
+    casing_slope: Annotated[
+        float | None,
+        typer.Option(metavar="dr/dz", help="Of the casing; left out: of the tip.", show_default=False),
+    ] = None,
+    damping: Annotated[
+        float | None, typer.Option(metavar="RATIO", help="Modal damping ratio.", show_default=False)
+    ] = None,
+    modes: Annotated[int, typer.Option(metavar="N", help="Modes to keep, of matrices.")] = 5,
+    design_speed: Annotated[
+        float | None, typer.Option(metavar="Hz", help="Design speed.", show_default=False)
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="Of the blade.", show_default=False)
+    ] = None,
+    format: FormatOption = None,
+    modal: ModalOption = None,
+    stiffness: StiffnessOption = None,
+    mass: MassOption = None,
+    units: UnitsOption = "SI",
+    axis: AxisOption = None,
+    mass_normalised: NormalisedOption = False,
+) -> None:
+    """A blade file from another program's matrices or modal data.
+
+    Nastran OP4 and DMIG, universal files (55), MATLAB, Matrix Market, CalculiX matrix storage, CSV, npz.
+    Companion tables say what a format has no place for: node,component and node,x_m,y_m,z_m. Examples:
+    rubscreen blade import job.sti job.inp --tip 101,105,109 --damping 1e-3;
+    rubscreen blade import 0=rest.uff 250=fast.uff --damping 1e-3
+    """
+    from sdm_core.blade import write_blade
+    from service.commands.blade_import import ImportChoices, imported
+    from service.commands.blade_tables import about_blade, modes_table
+    from service.commands.outputs import check_writable, terminal
+
+    first = files[0].partition("=")[2] or files[0]
+    target = out or str(Path(first).with_suffix("")) + ".blade.json"
+    check_writable(inputs=[text.partition("=")[2] or text for text in files], out=target)
+    choices = ImportChoices(
+        format, modal, stiffness, mass, units, axis, tip, names, direction, casing_slope, modes, damping,
+        design_speed, name, mass_normalised,
+    )  # fmt: skip
+    found = imported(files, choices, blade_wanted=True)
+    assert found.blade is not None
+    write_blade(found.blade, target)
+    console = terminal()
+    console.print(modes_table(found.blade))
+    for line in (*about_blade(found.blade), *found.findings.lines()):
+        console.print(line, highlight=False)
+    console.print(f"written to {target}")
+
+
+@app.command()
+def check(
+    files: FilesArgument,
+    tip: Annotated[
+        str | None, typer.Option(metavar="101,105,...", help="Contact nodes.", show_default=False)
+    ] = None,
+    format: FormatOption = None,
+    modal: ModalOption = None,
+    stiffness: StiffnessOption = None,
+    mass: MassOption = None,
+    units: UnitsOption = "SI",
+    axis: AxisOption = None,
+    mass_normalised: NormalisedOption = False,
+    damping: Annotated[
+        float | None, typer.Option(metavar="RATIO", help="Of modal data without.", show_default=False)
+    ] = None,
+) -> None:
+    """Check a blade file, matrices or modal data, and say what was found; exit code 1 with warnings.
+
+    Example: rubscreen blade check my_blade.json
+    """
+    from service.commands.blade_import import ImportChoices, imported
+    from service.commands.outputs import terminal
+
+    choices = ImportChoices(
+        format, modal, stiffness, mass, units, axis, tip, damping=damping, mass_normalised=mass_normalised
+    )
+    found = imported(files, choices, blade_wanted=False)
+    console = terminal()
+    for line in found.findings.lines():
+        console.print(line, highlight=False)
+    if found.findings.warnings:
+        console.print(f"{len(found.findings.warnings)} warnings")
+        raise typer.Exit(1)
+    console.print("nothing suspicious")
+
+
+@app.command()
+def export(
+    blade: BladeArgument,
+    out: Annotated[str, typer.Argument(metavar="FILE", help="npz, mat, uff, csv or json by its ending.")],
+    format: FormatOption = None,
+) -> None:
+    """A blade file as npz, MATLAB, universal file or CSV.
+
+    Example: rubscreen blade export nasa_rotor_37 rotor37.mat
+    """
+    from sdm_core.blade.exchange import export_blade
+    from service.commands.inputs import blade_from
+    from service.commands.outputs import check_writable, terminal
+
+    check_writable(inputs=[blade], out=out)
+    written = export_blade(blade_from(blade), out, format=format)
+    console = terminal()
+    for path in written.paths:
+        console.print(f"written to {path}")
+    for what in written.left_out:
+        console.print(f"left out: {what}")
+    if written.digits < 16:
+        console.print(f"numbers keep {written.digits} digits in this format")
 
 
 @app.command()

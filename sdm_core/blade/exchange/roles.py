@@ -81,6 +81,15 @@ def roles(
         ks = [(_speed(k, found), k)]
     elif speeds:
         ks = [_of_table(name, value, square, have) for name, value in speeds.items()]
+        # One whose speed was lost must not be left out silently.
+        for held in square:
+            told = any(held.content is k.content and held.name == k.name for _, k in ks)
+            if _STIFFNESS.fullmatch(held.name) and not told and held is not m:
+                raise InvalidInput(
+                    held.where,
+                    "a stiffness without rotor speed, beside others with one",
+                    'name those to take: stiffness={speed_hz: "name"}',
+                )
     else:
         likely = [held for held in square if _STIFFNESS.fullmatch(held.name) and held is not m]
         k = _only("stiffness", likely, have)

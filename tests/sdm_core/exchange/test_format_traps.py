@@ -127,6 +127,14 @@ def test_bulk_data_with_missing_or_wrong_parts_is_refused(text, words, tmp_path,
     refused(read, tmp_path / "a.bdf", "a.bdf", *words)
 
 
+def test_a_stiffness_whose_rotor_speed_was_lost_is_not_left_out_silently(reduced_model, tmp_path, refused):
+    path = write_model(reduced_model, tmp_path / "a.pch").paths[0]
+    path.write_text(path.read_text().replace("$ SPEED_HZ KAAX2", "$ SPEED?HZ KAAX2"))
+    refused(read, path, "a.pch: KAAX2", "without rotor speed")
+    found = read_matrix_model(path, stiffness={0.0: "KAAX1"})
+    assert len(found.model.states) == 1
+
+
 def uff(*datasets: str) -> str:
     return "".join(f"    -1\n{text}    -1\n" for text in datasets)
 
