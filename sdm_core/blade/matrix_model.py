@@ -78,11 +78,12 @@ class DofMap:
         for i, node in enumerate(nodes):
             for c in TRANSLATIONS:
                 if (int(node), c) not in where:
+                    there = np.unique(self.node[np.isin(self.component, TRANSLATIONS)])
+                    known = ", ".join(map(str, there[:12])) + (", ..." if len(there) > 12 else "")
                     raise InvalidInput(
                         f"tip.nodes[{i}]",
                         node,
-                        f"the matrices have no displacement {c} of this node: keep it in the model, or name "
-                        "another",
+                        f"the matrices have no displacement {c} of this node: name some of {known}",
                     )
                 out[i, c - 1] = where[int(node), c]
         return out
@@ -167,10 +168,11 @@ class MatrixModel:
         states = []
         for i, state in enumerate(self.states):
             omega2, shape = self.modes(state, modes)
-            if (omega2 <= 0).any():
+            loose = omega2 <= _rounding(state.stiffness, self.mass)
+            if loose.any():
                 raise InvalidInput(
                     f"states[{i}].stiffness",
-                    f"mode {int(np.argmax(omega2 <= 0)) + 1} has ω² = {omega2.min():.3g}",
+                    f"mode {int(np.argmax(loose)) + 1} has ω² = {omega2.min():.3g}",
                     "the blade buckles or moves as a rigid body: clamp its root, check the stiffness",
                 )
             at_tip = shape[rows].transpose(2, 0, 1)  # (n, r, 3)
@@ -255,6 +257,12 @@ def lowest_modes(stiffness: Matrix, mass: Matrix, count: int) -> tuple[np.ndarra
     omega2, shape = eigsh(csc_array(stiffness), count, csc_array(mass), sigma=0.0, OPinv=inverse, v0=start)
     rising = np.argsort(omega2)
     return omega2[rising], shape[:, rising]
+
+
+def _rounding(stiffness: Matrix, mass: Matrix) -> float:
+    """ω² that rounding alone can make of a rigid body's 0: the largest ω², by its diagonal, times 1e-14."""
+    k, m = stiffness.diagonal(), mass.diagonal()
+    return 1e-14 * float((k[m > 0] / m[m > 0]).max(initial=0.0))
 
 
 def _untwist(place: np.ndarray, moved: np.ndarray, frames: np.ndarray) -> float | None:

@@ -25,8 +25,8 @@ class Material:
 
     Examples
     --------
-    >>> Material(108e9, 0.34, 4400.0).shear_modulus
-    40298507462.68657
+    >>> round(Material(108e9, 0.34, 4400.0).shear_modulus / 1e9, 2)
+    40.3
     """
 
     youngs_modulus: float
