@@ -10,7 +10,7 @@ import numpy as np
 
 from sdm_core.blade import EXAMPLES, Blade, example_blade
 from sdm_core.blade.exchange import Findings, read_matrix_model, read_modal
-from sdm_core.blade.exchange.modal_checks import check_blade
+from sdm_core.blade.exchange.checks.modal import check_blade
 from sdm_core.blade.matrix_model import MatrixModel
 from sdm_core.blade.tip_line import Direction, TipLine
 from sdm_core.errors import InvalidInput

@@ -6,8 +6,8 @@ from typing import Any
 
 from sdm_core.blade import Blade, blade_to_dict
 from sdm_core.blade.build import BladeBuild, build_blade
-from sdm_core.blade.exchange.findings import Findings
-from sdm_core.blade.exchange.modal_checks import check_blade
+from sdm_core.blade.exchange.checks.findings import Findings
+from sdm_core.blade.exchange.checks.modal import check_blade
 from sdm_core.blade.profile import BladeProfile
 
 Json = dict[str, Any]

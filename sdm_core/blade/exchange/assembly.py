@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import issparse
 
-from sdm_core.blade.exchange.checks import check_model
+from sdm_core.blade.exchange.checks.definiteness import symmetrised
+from sdm_core.blade.exchange.checks.findings import Finding, Findings, note, warning
+from sdm_core.blade.exchange.checks.matrices import check_model
+from sdm_core.blade.exchange.checks.modal import mass_normalisation
 from sdm_core.blade.exchange.content import FileContent, Positions
-from sdm_core.blade.exchange.definiteness import symmetrised
-from sdm_core.blade.exchange.findings import Finding, Findings, note, warning
-from sdm_core.blade.exchange.modal_checks import mass_normalisation
 from sdm_core.blade.exchange.roles import Held, roles
 from sdm_core.blade.exchange.units import SI, Units
 from sdm_core.blade.matrix_model import DofMap, Matrix, MatrixModel, SpeedState

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import issparse
 
-from sdm_core.blade.exchange.findings import Finding
+from sdm_core.blade.exchange.checks.findings import Finding
 from sdm_core.blade.matrix_model import DofMap, Matrix, MatrixModel
 from sdm_core.errors import DamagedFile
 

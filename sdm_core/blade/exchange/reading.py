@@ -10,21 +10,21 @@ import numpy as np
 
 from sdm_core.blade.blade_file import read_blade
 from sdm_core.blade.exchange.assembly import Wanted, assembled
-from sdm_core.blade.exchange.calculix import companions, read_calculix
+from sdm_core.blade.exchange.checks.findings import Finding, Findings, note
+from sdm_core.blade.exchange.checks.modal import check_blade
 from sdm_core.blade.exchange.content import FileContent
-from sdm_core.blade.exchange.csv_matrices import read_csv_matrices
-from sdm_core.blade.exchange.csv_modal import read_csv_modal
-from sdm_core.blade.exchange.dmig import read_dmig
-from sdm_core.blade.exchange.file_bytes import file_size, named_damage
-from sdm_core.blade.exchange.findings import Finding, Findings, note
 from sdm_core.blade.exchange.formats import MATRICES, MODAL, format_of
-from sdm_core.blade.exchange.mat import read_mat_matrices, read_mat_modal
-from sdm_core.blade.exchange.matrix_market import read_matrix_market
-from sdm_core.blade.exchange.modal_checks import check_blade
-from sdm_core.blade.exchange.npz import read_npz_blade, read_npz_model
-from sdm_core.blade.exchange.op4 import read_op4
+from sdm_core.blade.exchange.named_arrays.mat import read_mat_matrices, read_mat_modal
+from sdm_core.blade.exchange.named_arrays.npz import read_npz_blade, read_npz_model
+from sdm_core.blade.exchange.nastran.dmig import read_dmig
+from sdm_core.blade.exchange.nastran.op4 import read_op4
+from sdm_core.blade.exchange.parsing.file_bytes import file_size, named_damage
+from sdm_core.blade.exchange.tables.matrices import read_csv_matrices
+from sdm_core.blade.exchange.tables.modal import read_csv_modal
+from sdm_core.blade.exchange.triplets.calculix import companions, read_calculix
+from sdm_core.blade.exchange.triplets.matrix_market import read_matrix_market
 from sdm_core.blade.exchange.units import SI, Units, units_of
-from sdm_core.blade.exchange.universal_blade import read_universal
+from sdm_core.blade.exchange.universal.blade import read_universal
 from sdm_core.blade.matrix_model import MatrixModel
 from sdm_core.blade.modal import Blade, ModalState
 from sdm_core.blade.tip_line import TipLine

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from sdm_core.blade.exchange.checks.findings import Finding, note, warning
 from sdm_core.blade.exchange.content import FileContent
-from sdm_core.blade.exchange.findings import Finding, note, warning
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.errors import InvalidInput
 

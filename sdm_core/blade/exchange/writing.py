@@ -6,19 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sdm_core.blade.blade_file import write_blade
-from sdm_core.blade.exchange.calculix import write_calculix
 from sdm_core.blade.exchange.content import arrays_of_model
-from sdm_core.blade.exchange.csv_matrices import NODES_M, SPEEDS, write_csv_matrix, write_dofs
-from sdm_core.blade.exchange.csv_modal import write_csv_modal
-from sdm_core.blade.exchange.csv_tables import write_table
-from sdm_core.blade.exchange.dmig import write_dmig
 from sdm_core.blade.exchange.formats import MATRICES, MODAL, format_of
-from sdm_core.blade.exchange.mat import write_mat
-from sdm_core.blade.exchange.matrix_market import write_matrix_market
-from sdm_core.blade.exchange.modal_arrays import arrays_of_blade
-from sdm_core.blade.exchange.npz import write_npz_blade, write_npz_model
-from sdm_core.blade.exchange.op4_write import write_op4
-from sdm_core.blade.exchange.universal_write import write_universal
+from sdm_core.blade.exchange.named_arrays.mat import write_mat
+from sdm_core.blade.exchange.named_arrays.modal import arrays_of_blade
+from sdm_core.blade.exchange.named_arrays.npz import write_npz_blade, write_npz_model
+from sdm_core.blade.exchange.nastran.dmig import write_dmig
+from sdm_core.blade.exchange.nastran.op4_write import write_op4
+from sdm_core.blade.exchange.tables.matrices import NODES_M, SPEEDS, write_csv_matrix, write_dofs
+from sdm_core.blade.exchange.tables.modal import write_csv_modal
+from sdm_core.blade.exchange.tables.table import write_table
+from sdm_core.blade.exchange.triplets.calculix import write_calculix
+from sdm_core.blade.exchange.triplets.matrix_market import write_matrix_market
+from sdm_core.blade.exchange.universal.write import write_universal
 from sdm_core.blade.matrix_model import MatrixModel
 from sdm_core.blade.modal import Blade
 from sdm_core.errors import InvalidInput

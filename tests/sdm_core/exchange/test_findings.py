@@ -11,9 +11,9 @@ import pytest
 
 from sdm_core.blade import Blade, ModalState
 from sdm_core.blade.exchange import export_blade, read_matrix_model, read_modal, write_model
+from sdm_core.blade.exchange.checks.modal import mass_normalisation
 from sdm_core.blade.exchange.content import arrays_of_model
-from sdm_core.blade.exchange.modal_checks import mass_normalisation
-from sdm_core.blade.exchange.op4_write import _ascii
+from sdm_core.blade.exchange.nastran.op4_write import _ascii
 from sdm_core.blade.matrix_model import DofMap, MatrixModel, SpeedState
 from sdm_core.errors import InvalidInput
 
@@ -63,7 +63,7 @@ def test_mass_of_a_free_body_is_whole_and_its_six_rigid_modes_are_counted(full_m
 
 
 def test_large_sparse_and_small_dense_checks_agree(full_model, monkeypatch, tmp_path):
-    from sdm_core.blade.exchange import definiteness
+    from sdm_core.blade.exchange.checks import definiteness
 
     dense = imported(full_model, tmp_path).findings.figures
     monkeypatch.setattr(definiteness, "DENSE_UP_TO", 10)

@@ -11,8 +11,8 @@ from scipy.io import loadmat, mmwrite, savemat
 from scipy.sparse import csc_array, issparse
 
 from sdm_core.blade.exchange import export_blade, read_matrix_model, read_modal, write_model
-from sdm_core.blade.exchange.dmig import read_dmig
-from sdm_core.blade.exchange.op4 import read_op4
+from sdm_core.blade.exchange.nastran.dmig import read_dmig
+from sdm_core.blade.exchange.nastran.op4 import read_op4
 from sdm_core.blade.matrix_model import SpeedState
 from sdm_core.blade.tip_line import TipLine
 from sdm_core.errors import InvalidInput

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_array, csc_array, triu
 
-from sdm_core.blade.exchange.bulk_data import Entry, entries, field_text
+from sdm_core.blade.exchange.checks.findings import Finding, note
 from sdm_core.blade.exchange.content import FileContent, bounded_shape
-from sdm_core.blade.exchange.coordinate_systems import KINDS, coordinate_systems, to_basic
-from sdm_core.blade.exchange.file_bytes import file_text, whole_lines
-from sdm_core.blade.exchange.findings import Finding, note
-from sdm_core.blade.exchange.fortran_fields import integer, real
-from sdm_core.blade.exchange.grid_places import grid_places
+from sdm_core.blade.exchange.nastran.bulk_data import Entry, entries, field_text
+from sdm_core.blade.exchange.nastran.coordinate_systems import KINDS, coordinate_systems, to_basic
+from sdm_core.blade.exchange.nastran.grid_places import grid_places
+from sdm_core.blade.exchange.parsing.file_bytes import file_text, whole_lines
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
 from sdm_core.blade.matrix_model import MODAL, DofMap, Matrix, MatrixModel
 from sdm_core.errors import DamagedFile
 

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from sdm_core.blade.exchange.checks.findings import Finding, note, warning
 from sdm_core.blade.exchange.content import Positions
-from sdm_core.blade.exchange.findings import Finding, note, warning
-from sdm_core.blade.exchange.nodal_modes import NodalModes, blade_at_tip
 from sdm_core.blade.exchange.units import Units
-from sdm_core.blade.exchange.universal_modes import (
+from sdm_core.blade.exchange.universal.modes import (
     Mode,
     UniversalModes,
     checked_units,
     normalised,
     read_universal_modes,
 )
+from sdm_core.blade.exchange.universal.nodal_modes import NodalModes, blade_at_tip
 from sdm_core.blade.modal import DIRECTIONS, Blade, ModalState
 from sdm_core.blade.tip_line import TipLine, cylindrical_frames
 from sdm_core.blade.tracking import FURTHER_SHAPES
@@ -36,7 +36,7 @@ def read_universal(
     name: str | None,
     findings: list[Finding],
 ) -> Blade:
-    """Modal data of a file with a load case a speed, or of a file a speed (see `reading.read_modal`).
+    """Modal data of a file with a load case a speed, or of a file a speed (see `exchange.read_modal`).
 
     Raises
     ------

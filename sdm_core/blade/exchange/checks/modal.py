@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdm_core.blade.exchange.checks import LARGEST_FALL
-from sdm_core.blade.exchange.findings import Finding, Findings, warning
-from sdm_core.blade.exchange.plausibility import suspicious_frequency
+from sdm_core.blade.exchange.checks.findings import Finding, Findings, warning
+from sdm_core.blade.exchange.checks.matrices import LARGEST_FALL
+from sdm_core.blade.exchange.checks.plausibility import suspicious_frequency
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.blade.modal import Blade
 from sdm_core.errors import InvalidInput

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import issparse
 
+from sdm_core.blade.exchange.checks.findings import Finding, note
 from sdm_core.blade.exchange.content import FileContent, content_of_arrays
-from sdm_core.blade.exchange.file_bytes import file_bytes
-from sdm_core.blade.exchange.findings import Finding, note
-from sdm_core.blade.exchange.mat5 import Unread, read_mat5
-from sdm_core.blade.exchange.mat73 import read_mat73, write_mat73
-from sdm_core.blade.exchange.modal_arrays import blade_of_arrays
+from sdm_core.blade.exchange.named_arrays.mat5 import Unread, read_mat5
+from sdm_core.blade.exchange.named_arrays.mat73 import read_mat73, write_mat73
+from sdm_core.blade.exchange.named_arrays.modal import blade_of_arrays
+from sdm_core.blade.exchange.parsing.file_bytes import file_bytes
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.blade.modal import Blade
 from sdm_core.errors import DamagedFile
@@ -92,7 +92,7 @@ def _is_matrix(value: Any) -> bool:
 
 
 def read_mat_modal(path: Path) -> Blade:
-    """Modal data of a .mat file, at the top or in the structure ``blade`` (see `modal_arrays`)."""
+    """Modal data of a .mat file, at the top or in the structure ``blade`` (see `modal`)."""
     tree = mat_tree(path)
     part = tree.get("blade", tree)
     if not isinstance(part, dict):

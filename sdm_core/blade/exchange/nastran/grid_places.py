@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sdm_core.blade.exchange.bulk_data import Entry
 from sdm_core.blade.exchange.content import Positions
-from sdm_core.blade.exchange.coordinate_systems import CoordinateSystem
-from sdm_core.blade.exchange.fortran_fields import integer, real
+from sdm_core.blade.exchange.nastran.bulk_data import Entry
+from sdm_core.blade.exchange.nastran.coordinate_systems import CoordinateSystem
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
 from sdm_core.errors import DamagedFile, InvalidInput
 
 

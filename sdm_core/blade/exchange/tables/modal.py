@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from sdm_core.blade.exchange.csv_tables import Table, read_table, write_table
-from sdm_core.blade.exchange.fortran_fields import real
+from sdm_core.blade.exchange.parsing.fortran_fields import real
+from sdm_core.blade.exchange.tables.table import Table, read_table, write_table
 from sdm_core.blade.modal import Blade, ModalState
 from sdm_core.errors import DamagedFile
 

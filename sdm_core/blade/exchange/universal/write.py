@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sdm_core.blade.exchange.universal_modes import (
+from sdm_core.blade.exchange.universal.modes import (
     DOUBLE,
     EIGENVECTOR,
     NORMAL_MODE,

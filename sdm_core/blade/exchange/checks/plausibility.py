@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sdm_core.blade.exchange.findings import Finding, warning
+from sdm_core.blade.exchange.checks.findings import Finding, warning
 from sdm_core.blade.matrix_model import MatrixModel
 
 # From fan blades of large engines to compressor blades of a few centimetres, with room.

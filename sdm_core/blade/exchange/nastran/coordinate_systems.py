@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import csc_array, issparse, lil_array
 
-from sdm_core.blade.exchange.bulk_data import Entry
-from sdm_core.blade.exchange.fortran_fields import integer, real
+from sdm_core.blade.exchange.nastran.bulk_data import Entry
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
 from sdm_core.blade.matrix_model import DofMap, Matrix
 from sdm_core.errors import DamagedFile, InvalidInput
 

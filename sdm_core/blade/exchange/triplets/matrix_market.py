@@ -13,8 +13,8 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from sdm_core.blade.exchange.content import FileContent, bounded_shape
-from sdm_core.blade.exchange.file_bytes import file_text, whole_lines
-from sdm_core.blade.exchange.fortran_fields import integer
+from sdm_core.blade.exchange.parsing.file_bytes import file_text, whole_lines
+from sdm_core.blade.exchange.parsing.fortran_fields import integer
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.errors import DamagedFile
 

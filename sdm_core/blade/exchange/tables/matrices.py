@@ -17,9 +17,9 @@ import numpy as np
 from scipy.sparse import csc_array, issparse, triu
 
 from sdm_core.blade.exchange.content import FileContent, bounded_shape, positions_of
-from sdm_core.blade.exchange.csv_tables import Table, read_table, write_table
-from sdm_core.blade.exchange.matrix_market import name_in_file_name
-from sdm_core.blade.exchange.triplets import matrix_of_triplets
+from sdm_core.blade.exchange.tables.table import Table, read_table, write_table
+from sdm_core.blade.exchange.triplets.matrix import matrix_of_triplets
+from sdm_core.blade.exchange.triplets.matrix_market import name_in_file_name
 from sdm_core.blade.matrix_model import MODAL, DofMap, Matrix
 from sdm_core.errors import DamagedFile
 

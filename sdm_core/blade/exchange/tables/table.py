@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sdm_core.blade.exchange.file_bytes import file_text, whole_lines
-from sdm_core.blade.exchange.fortran_fields import real
+from sdm_core.blade.exchange.parsing.file_bytes import file_text, whole_lines
+from sdm_core.blade.exchange.parsing.fortran_fields import real
 from sdm_core.errors import DamagedFile
 
 _REMARK = re.compile(r"#\s*(\w+)\s*=\s*(.*)")

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sdm_core.blade.exchange.checks.findings import Finding, note, warning
 from sdm_core.blade.exchange.content import Positions
-from sdm_core.blade.exchange.findings import Finding, note, warning
-from sdm_core.blade.exchange.fortran_fields import integer, real
-from sdm_core.blade.exchange.universal import CUT_OFF, Dataset, datasets, length_factor, node_places
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
+from sdm_core.blade.exchange.universal.datasets import CUT_OFF, Dataset, datasets, length_factor, node_places
 from sdm_core.errors import DamagedFile, InvalidInput
 
 NORMAL_MODE, REAL, DOUBLE = 2, 2, 4

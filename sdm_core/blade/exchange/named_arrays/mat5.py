@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from sdm_core.blade.exchange.content import bounded_shape
-from sdm_core.blade.exchange.file_bytes import LARGEST_FILE_BYTES
+from sdm_core.blade.exchange.parsing.file_bytes import LARGEST_FILE_BYTES
 from sdm_core.errors import DamagedFile
 
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}

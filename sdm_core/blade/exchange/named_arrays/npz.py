@@ -13,9 +13,9 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from sdm_core.blade.exchange.content import FileContent
-from sdm_core.blade.exchange.file_bytes import LARGEST_FILE_BYTES, file_bytes
-from sdm_core.blade.exchange.mat5 import checked_sparse
-from sdm_core.blade.exchange.modal_arrays import arrays_of_blade, blade_of_arrays
+from sdm_core.blade.exchange.named_arrays.mat5 import checked_sparse
+from sdm_core.blade.exchange.named_arrays.modal import arrays_of_blade, blade_of_arrays
+from sdm_core.blade.exchange.parsing.file_bytes import LARGEST_FILE_BYTES, file_bytes
 from sdm_core.blade.matrix_model import DofMap, Matrix, MatrixModel
 from sdm_core.blade.modal import Blade
 from sdm_core.errors import DamagedFile

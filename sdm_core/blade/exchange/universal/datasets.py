@@ -15,8 +15,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from sdm_core.blade.exchange.content import Positions
-from sdm_core.blade.exchange.file_bytes import file_bytes
-from sdm_core.blade.exchange.fortran_fields import integer, real
+from sdm_core.blade.exchange.parsing.file_bytes import file_bytes
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
 from sdm_core.errors import DamagedFile
 
 _MARK = re.compile(rb" {4}-1\s*")

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from sdm_core.blade.exchange.content import FileContent, bounded_shape, content_of_arrays
-from sdm_core.blade.exchange.file_bytes import file_bytes
-from sdm_core.blade.exchange.fortran_fields import integer, reals
+from sdm_core.blade.exchange.parsing.file_bytes import file_bytes
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, reals
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.errors import DamagedFile
 
@@ -129,7 +129,7 @@ def read_op4(path: Path) -> FileContent:
     """
     data = file_bytes(path)
     if len(data) >= 16 and data[:4] in _MARKERS:
-        from sdm_core.blade.exchange.op4_binary import binary_matrices
+        from sdm_core.blade.exchange.nastran.op4_binary import binary_matrices
 
         matrices = binary_matrices(path, data)
     else:

@@ -10,9 +10,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from sdm_core.blade.exchange.definiteness import check_mass, entries, spectrum
-from sdm_core.blade.exchange.findings import Finding, Findings, note, warning
-from sdm_core.blade.exchange.plausibility import suspicious_frequency, suspicious_mass, suspicious_places
+from sdm_core.blade.exchange.checks.definiteness import check_mass, entries, spectrum
+from sdm_core.blade.exchange.checks.findings import Finding, Findings, note, warning
+from sdm_core.blade.exchange.checks.plausibility import (
+    suspicious_frequency,
+    suspicious_mass,
+    suspicious_places,
+)
 from sdm_core.blade.matrix_model import MODAL, TRANSLATIONS, DofMap, Matrix, MatrixModel
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import SPEED_LIMITS_HZ, number

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import csc_array, triu
 
+from sdm_core.blade.exchange.checks.findings import Finding, note
 from sdm_core.blade.exchange.content import FileContent, Positions
-from sdm_core.blade.exchange.file_bytes import file_text, whole_lines
-from sdm_core.blade.exchange.findings import Finding, note
-from sdm_core.blade.exchange.fortran_fields import integer, real
-from sdm_core.blade.exchange.triplets import matrix_of_triplets
+from sdm_core.blade.exchange.parsing.file_bytes import file_text, whole_lines
+from sdm_core.blade.exchange.parsing.fortran_fields import integer, real
+from sdm_core.blade.exchange.triplets.matrix import matrix_of_triplets
 from sdm_core.blade.matrix_model import TRANSLATIONS, DofMap, Matrix, MatrixModel
 from sdm_core.errors import DamagedFile, InvalidInput
 

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from sdm_core.blade.exchange.content import bounded_shape
-from sdm_core.blade.exchange.file_bytes import LARGEST_FILE_BYTES
-from sdm_core.blade.exchange.mat5 import Unread, checked_sparse
+from sdm_core.blade.exchange.named_arrays.mat5 import Unread, checked_sparse
+from sdm_core.blade.exchange.parsing.file_bytes import LARGEST_FILE_BYTES
 from sdm_core.errors import DamagedFile
 
 # Deflate gains at most about a factor of a thousand; more is a damaged size.

@@ -1,0 +1,1 @@
+"""What imported data are checked for, and how it is said."""

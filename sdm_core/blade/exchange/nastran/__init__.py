@@ -1,0 +1,1 @@
+"""Nastran: OUTPUT4 matrices, and matrices, nodes and coordinate systems in bulk data."""

@@ -1,0 +1,1 @@
+"""Bytes, lines and numbers of a file, whatever its format."""

@@ -1,0 +1,1 @@
+"""CSV tables: matrices with their companions, and modal data."""

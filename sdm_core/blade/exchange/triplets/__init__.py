@@ -1,0 +1,1 @@
+"""Files of one matrix as lines of row, column, value: CalculiX and Matrix Market."""
