@@ -39,10 +39,10 @@ class ParabolicLobes:
     def deepest_tip_hz(self) -> float:
         return self.frequency_hz / (self.deepest + 0.25)
 
-    def points(self, blade, contact, speed_hz, ke, policy="auto") -> PointAnswers:
+    def points(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> PointAnswers:
         raise AssertionError("screening asks for boundaries and maps")
 
-    def boundary(self, blade, contact, speed_hz, ke_max, policy="auto") -> BoundaryAnswers:
+    def boundary(self, blade, contact, speed_hz, ke_max, policy="auto", alpha=None) -> BoundaryAnswers:
         self.asked.append(("boundary", policy, len(speed_hz)))
         exact = policy == "exact"
         ke = self.critical_ke(contact, speed_hz)
@@ -61,7 +61,7 @@ class ParabolicLobes:
             "parabola",
         )
 
-    def map(self, blade, contact, speed_hz, ke, policy="auto") -> MapAnswers:
+    def map(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> MapAnswers:
         self.asked.append(("map", policy, len(speed_hz) * len(ke)))
         unstable = ke[:, None] >= self.critical_ke(contact, speed_hz)[None, :]
         source = np.full(unstable.shape, "surrogate")

@@ -58,7 +58,7 @@ class RuleScreener:
     def _verdict(self, ke: np.ndarray) -> np.ndarray:
         return np.where(ke == self.critical, np.nan, np.where(ke < self.critical, 1.0, 0.0))
 
-    def points(self, blade, contact, speed_hz, ke, policy="auto") -> PointAnswers:
+    def points(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> PointAnswers:
         origin = self._origin(ke, policy)
         exact = origin["source"] == "exact"
         radius = np.where(exact, ke / self.critical, np.nan)
@@ -76,7 +76,7 @@ class RuleScreener:
             **origin,
         )
 
-    def boundary(self, blade, contact, speed_hz, ke_max, policy="auto") -> BoundaryAnswers:
+    def boundary(self, blade, contact, speed_hz, ke_max, policy="auto", alpha=None) -> BoundaryAnswers:
         origin = self._origin(np.full(speed_hz.shape, ke_max), policy)
         found = ke_max > self.critical
         intervals = (((self.critical, ke_max),) if found else ()) if origin["source"][0] == "exact" else None
@@ -90,7 +90,7 @@ class RuleScreener:
             **origin,
         )
 
-    def map(self, blade, contact, speed_hz, ke, policy="auto") -> MapAnswers:
+    def map(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> MapAnswers:
         grid = np.repeat(ke[:, None], len(speed_hz), axis=1)
         origin = self._origin(grid, policy)
         probability = np.where(origin["source"] == "exact", np.nan, 0.25)
