@@ -13,6 +13,7 @@ import numpy as np
 from sdm_core.blade.modal import Blade, ModalState
 from sdm_core.blade.tracking import FURTHER_SHAPES
 from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.whole_files import staged
 
 SCHEMA = "rubscreen/blade/1"
 EXAMPLES = ("nasa_rotor_37", "generic_compressor_blade")
@@ -103,7 +104,7 @@ def read_blade(path: str | Path) -> Blade:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise InvalidInput("blade file", str(path), "give a file under 64 MiB")
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # Windows editors put a mark first
     except OSError as error:
         raise InvalidInput("blade file", str(path), f"give a readable file ({error.strerror})") from None
     except UnicodeDecodeError:
@@ -121,8 +122,15 @@ def read_blade(path: str | Path) -> Blade:
 
 
 def write_blade(blade: Blade, path: str | Path) -> None:
-    """Write a blade file."""
-    Path(path).write_text(json.dumps(blade_to_dict(blade), indent=1) + "\n", encoding="utf-8")
+    """Write a blade file, whole or not at all.
+
+    Raises
+    ------
+    InvalidInput
+        When it cannot be written there.
+    """
+    with staged(path, "blade file") as beside:
+        beside.write_text(json.dumps(blade_to_dict(blade), indent=1) + "\n", encoding="utf-8")
 
 
 def example_blade(name: str) -> Blade:

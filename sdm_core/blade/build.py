@@ -138,9 +138,13 @@ def build_blade(
                 mass_kg=model.total_mass_kg,
                 material=profile.material.to_dict(),
             )
-        except ModesNotTracked:
+        except ModesNotTracked as error:
             if 2 * len(speeds) - 1 > MOST_STATES:
-                raise
+                raise ModesNotTracked(
+                    "speeds_hz",
+                    error.value,
+                    f"{error.remedy} (speeds_hz of the profile), or ask for fewer modes",
+                ) from None
             speeds = sorted({*speeds, *(_between(a, b) for a, b in pairwise(speeds))})
             steps.add(3 * (len(speeds) - len(equilibria)))
             continue
@@ -248,5 +252,5 @@ class _Steps:
         self._tell(f"{self._what}: {detail}")
 
     def _tell(self, what: str) -> None:
-        self._shown = max(self._shown, min(self._done / self._total, 1.0))
+        self._shown = max(self._shown, min(self._done / self._total, 0.99))
         self._progress(self._shown, what)

@@ -248,7 +248,7 @@ def lowest_modes(stiffness: Matrix, mass: Matrix, count: int) -> tuple[np.ndarra
         try:
             omega2, shape = linalg.eigh(k, m, subset_by_index=(0, count - 1))
         except linalg.LinAlgError:
-            raise InvalidInput("mass", f"{size} × {size}", "it is not positive definite") from None
+            return _by_compliance(k, m, count)
         return omega2, shape
     solve = SymmetricFactor(csc_array(stiffness)).solve
     inverse = LinearOperator((size, size), matvec=solve, dtype=float)
@@ -257,6 +257,22 @@ def lowest_modes(stiffness: Matrix, mass: Matrix, count: int) -> tuple[np.ndarra
     omega2, shape = eigsh(csc_array(stiffness), count, csc_array(mass), sigma=0.0, OPinv=inverse, v0=start)
     rising = np.argsort(omega2)
     return omega2[rising], shape[:, rising]
+
+
+def _by_compliance(k: np.ndarray, m: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest modes as the largest 1/ω² of Mφ = (1/ω²)Kφ, where some directions have no mass."""
+    size = len(k)
+    try:
+        compliance, shape = linalg.eigh(m, k, subset_by_index=(size - count, size - 1))
+    except linalg.LinAlgError:
+        raise InvalidInput(
+            "mass",
+            f"{size} × {size}",
+            "it has directions without mass, and the stiffness does not hold the blade",
+        ) from None
+    if compliance[0] <= 0:
+        raise InvalidInput("mass", f"{size} × {size}", f"it has fewer than {count} modes: ask for fewer")
+    return 1.0 / compliance[::-1], shape[:, ::-1] / np.sqrt(compliance[::-1])
 
 
 def _rounding(stiffness: Matrix, mass: Matrix) -> float:

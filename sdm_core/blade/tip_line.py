@@ -132,7 +132,7 @@ def checked_direction(direction: Direction) -> Direction:
         return direction
     given = vector("tip.direction", direction, -1e6, 1e6, "")
     if len(given) != 3 or not given.any():
-        raise InvalidInput("tip.direction", list(given), "give (radial, tangential, axial), not zero")
+        raise InvalidInput("tip.direction", given.tolist(), "give (radial, tangential, axial), not zero")
     return float(given[0]), float(given[1]), float(given[2])
 
 

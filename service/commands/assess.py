@@ -63,6 +63,7 @@ def run(
     from pathlib import Path
 
     from sdm_core.assessment import assess
+    from sdm_core.validation import number
     from service.commands.assess_tables import edges_table, modes_table, said_of
     from service.commands.inputs import blade_from, check_work, contact_from, operating_points, speeds_from
     from service.commands.outputs import (
@@ -76,6 +77,8 @@ def run(
 
     report = None if out is None else str(Path(out) / "assessment.json")
     check_writable(inputs=[blade], json=json, out=report)
+    if clearance is not None:
+        number("--clearance", clearance, 0.0, 1e3, "mm")
     chosen = blade_from(blade)
     contact = contact_from(nodes, weights, arcs, engagement, chosen)
     span = speeds_from(speed, chosen)

@@ -226,12 +226,18 @@ def check(
     choices = ImportChoices(
         format, modal, stiffness, mass, units, axis, tip, damping=damping, mass_normalised=mass_normalised
     )
-    found = imported(files, choices, blade_wanted=False)
-    console = terminal()
-    for line in found.findings.lines():
-        console.print(line, highlight=False)
-    if found.findings.warnings:
-        console.print(f"{len(found.findings.warnings)} warnings")
+    # Blade files stand each for itself; files of other programs belong together.
+    alone = all(Path(text).suffix == ".json" or not Path(text).suffix for text in files)
+    console, warnings = terminal(), 0
+    for group in [[text] for text in files] if alone else [files]:
+        if len(files) > len(group):
+            console.print(f"{group[0]}:")
+        found = imported(group, choices, blade_wanted=False)
+        for line in found.findings.lines():
+            console.print(line, highlight=False)
+        warnings += len(found.findings.warnings)
+    if warnings:
+        console.print(f"{warnings} warnings")
         raise typer.Exit(1)
     console.print("nothing suspicious")
 

@@ -87,7 +87,7 @@ def blade_paths(texts: Sequence[str]) -> BladePaths:
             continue
         inside, beside = _opened(text)
         if not inside:
-            raise InvalidInput("BLADE", text, f"give a folder that holds blade files (*{SUFFIX})")
+            raise InvalidInput("BLADE", text, f"give a folder that holds blade or profile files (*{SUFFIX})")
         ignored += beside
         for path in inside:
             files.setdefault(_identity(path), path)
@@ -142,7 +142,7 @@ def schema_of(path: Path) -> str | None:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             return None
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
         return None
     schema = data.get("schema") if isinstance(data, dict) else None

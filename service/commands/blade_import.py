@@ -16,7 +16,9 @@ from sdm_core.blade.tip_line import Direction, TipLine
 from sdm_core.errors import InvalidInput
 
 MODAL_SUFFIXES = (".json", ".uff", ".unv", ".unf")
-# A CSV table of modal data has this column; one of matrices has not.
+# These hold either: they are tried as modal data first.
+_EITHER = (".npz", ".mat")
+# A CSV table of modal data has this column, under its comments; one of matrices has not.
 _MODAL_COLUMN = "frequency_hz"
 
 
@@ -63,6 +65,11 @@ def imported(files: Sequence[str], choices: ImportChoices, *, blade_wanted: bool
         return Imported(blade, None, check_blade(blade, units="SI"))
     if is_modal(files, choices):
         return _from_modal(files, choices)
+    if choices.modal is None and Path(files[0]).suffix.lower() in _EITHER:
+        try:
+            return _from_modal(files, choices)
+        except InvalidInput:
+            pass  # it holds matrices, or nothing: what is wrong with them is said below
     nodes = _numbers("--tip", choices.tip, int) if choices.tip else []
     read = read_matrix_model(
         list(files),
@@ -104,7 +111,7 @@ def is_modal(files: Sequence[str], choices: ImportChoices) -> bool:
         return True
     if first.suffix.lower() in (".csv", ".tsv", ".txt") and first.is_file():
         with first.open("rb") as file:
-            return _MODAL_COLUMN.encode() in file.readline(4096)
+            return _MODAL_COLUMN.encode() in file.read(65_536)
     return False
 
 

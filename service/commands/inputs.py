@@ -109,6 +109,11 @@ def operating_points(texts: Sequence[str], blade: Blade) -> list[OperatingPoint]
     for text in texts:
         typed, equals, share = (part.strip() for part in text.partition("="))
         speed = Speed.parse(typed, "--point").in_hz(blade.first_frequency_hz)
+        reach = blade.speed_range_hz
+        if reach is not None and not reach[0] <= speed <= reach[1] * (1 + 1e-9):
+            raise OutOfSpeedRange(
+                "--point", text, f"blade {blade.name!r} has modal data from {reach[0]:g} to {reach[1]:g} Hz"
+            )
         out.append(OperatingPoint(typed, speed, _number("--point", share, text) if equals else 1.0))
     return out
 

@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from sdm_core.blade import Blade
-from sdm_core.blade.profile import BladeProfile, profile_from_dict
+from sdm_core.blade.profile import SCHEMA, BladeProfile, profile_from_dict
 from sdm_core.errors import InvalidInput
 from service.rest.limits import TooLarge, check_length
 from service.rest.profile_schema import PROFILE
@@ -26,8 +26,9 @@ from service.settings import Settings
 
 def _profile(value: Any, info: ValidationInfo) -> BladeProfile:
     settings = settings_of(info)
-    if isinstance(value, dict):
-        check_length("profile.name", value.get("name"), settings.max_name_length, "shorten it")
+    if not isinstance(value, dict):
+        raise InvalidInput("profile", value, f"give an object with schema {SCHEMA!r}")
+    check_length("profile.name", value.get("name"), settings.max_name_length, "shorten it")
     try:
         profile = profile_from_dict(value)
     except InvalidInput as error:
@@ -63,6 +64,8 @@ class BladeQuestion(BaseModel):
         TooLarge
             When the mesh is over the limit of `settings`.
         """
+        if isinstance(data, dict) and data.get("schema") == SCHEMA:
+            raise InvalidInput("body", "a bare profile", 'wrap it: {"profile": ...}')
         if not isinstance(data, dict):
             raise InvalidInput("body", data, f"send a JSON object with {', '.join(cls.model_fields)}")
         try:

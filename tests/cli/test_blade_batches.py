@@ -108,7 +108,7 @@ def test_a_folder_without_blade_files_is_refused(rubscreen, answering, tmp_path)
     (tmp_path / "notes.txt").write_text("")
     result = rubscreen("screen", str(tmp_path), *GRID)
     assert result.exit_code == 2
-    assert "give a folder that holds blade files" in result.stderr
+    assert "give a folder that holds blade or profile files" in result.stderr
 
 
 def test_a_blade_named_and_in_a_folder_is_read_once(folder):

@@ -57,7 +57,7 @@ def test_a_reduced_model_imported_again_is_the_same_blade(command, profile, tmp_
 def test_a_blade_survives_export_and_import(command, tmp_path, ending):
     out, again = tmp_path / f"x.{ending}", tmp_path / "again.json"
     assert command("blade", "export", "nasa_rotor_37", out).exit_code == 0
-    done = command("blade", "import", out, "--modal", "-o", again)
+    done = command("blade", "import", out, "-o", again)
     assert done.exit_code == 0, done.output
     one, other = example_blade("nasa_rotor_37"), read_blade(again)
     for a, b in zip(one.states, other.states, strict=True):
@@ -147,3 +147,33 @@ def test_assess_answers_what_experts_ask(command, tmp_path):
     written = {path.name for path in (tmp_path / "a").iterdir()}
     assert written == {"assessment.json", "campbell.png", "lobes_by_mode.png", "clearance.png"}
     assert json.loads((tmp_path / "a" / "assessment.json").read_text())["schema"] == "rubscreen/assessment/1"
+
+
+def test_an_output_that_cannot_be_written_leaves_nothing_and_keeps_what_was_there(
+    command, tmp_path, monkeypatch
+):
+    import errno
+
+    from sdm_core.blade.exchange import writing
+
+    kept = tmp_path / "x.npz"
+    kept.write_bytes(b"older")
+
+    def full(blade, path):
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(writing, "write_npz_blade", full)
+    done = command("blade", "export", "nasa_rotor_37", kept)
+    assert done.exit_code == 2
+    assert "No space left" in done.output
+    assert kept.read_bytes() == b"older"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_several_blade_files_are_checked_one_by_one(command, tmp_path):
+    for name in ("a.json", "b.json"):
+        command("blade", "export", "nasa_rotor_37", tmp_path / name)
+    done = command("blade", "check", tmp_path / "a.json", tmp_path / "b.json")
+    assert done.exit_code == 0, done.output
+    assert "a.json:" in done.output and "b.json:" in done.output

@@ -220,7 +220,7 @@ def test_the_papers_upper_test_point_is_judged_by_the_exact_core(narrow, example
 def test_lines_name_what_was_not_comparable_and_what_the_paper_says():
     claims = (Claim("the paper's", "what is here", False), Claim("that", "too few", None))
     figure = PaperFigure(5, "", "", 1.0, (0.1, 0.4), (), claims)
-    assert figure.agrees == "None of the 2 statements compared."
+    assert figure.agrees == "Nothing, of 2 statements compared."
     assert figure.differs == (
         "What is here (the paper: the paper's); too few (not comparable; the paper: that)."
     )

@@ -12,10 +12,11 @@ from sdm_core.blade.exchange.checks.definiteness import symmetrised
 from sdm_core.blade.exchange.checks.findings import Finding, Findings, note, warning
 from sdm_core.blade.exchange.checks.matrices import check_model
 from sdm_core.blade.exchange.checks.modal import mass_normalisation
+from sdm_core.blade.exchange.condensation import condensed, condensed_mass, rows_without_mass
 from sdm_core.blade.exchange.content import FileContent, Positions
 from sdm_core.blade.exchange.roles import Held, roles
 from sdm_core.blade.exchange.units import SI, Units
-from sdm_core.blade.matrix_model import DofMap, Matrix, MatrixModel, SpeedState
+from sdm_core.blade.matrix_model import TRANSLATIONS, DofMap, Matrix, MatrixModel, SpeedState
 from sdm_core.errors import InvalidInput
 
 # Names under which exports carry mode shapes beside K and M.
@@ -68,16 +69,25 @@ def assembled(contents: Sequence[FileContent], wanted: Wanted) -> tuple[MatrixMo
             )
         ready.append(wanted.units.matrix(symmetric, dofs))
     mass, *stiffness = ready
+    moved = [_displacement(held, dofs, wanted.units) for _, held in part.stiffness]
+    # A displacement of a node with a place has mass: where it has none, the file is cut off.
+    places = _positions(contents, wanted.units)
+    placed = np.isin(dofs.node, list(places)) & np.isin(dofs.component, TRANSLATIONS)
+    massless = rows_without_mass(mass)
+    if massless.any() and places and not (massless & placed).any():
+        stiffness = [condensed(k, massless) for k in stiffness]
+        mass, dofs = condensed_mass(mass, massless), DofMap(dofs.node[~massless], dofs.component[~massless])
+        moved = [None if u is None else u[~massless] for u in moved]
+        found.append(note("mass", f"{massless.sum()} rows without mass condensed statically, which is exact"))
     states = [
-        SpeedState(speed, k, _displacement(held, dofs, wanted.units))
-        for (speed, held), k in zip(part.stiffness, stiffness, strict=True)
+        SpeedState(speed, k, u) for (speed, _), k, u in zip(part.stiffness, stiffness, moved, strict=True)
     ]
     model = MatrixModel(
         wanted.name or next((c.name for c in contents if c.name), part.mass.content.path.stem),
         dofs,
         mass,
         tuple(sorted(states, key=lambda state: state.speed_hz)),
-        _positions(contents, wanted.units),
+        places,
         _axis(contents, wanted.rotation_axis, found),
     )
     report = Findings(tuple(found)) + _given_shapes(contents, part.mass)
@@ -184,7 +194,7 @@ def _axis(
             warning(
                 "rotation_axis",
                 "not said: taken along z through the origin",
-                "give rotation_axis=(x, y, z) where the rotor turns about another",
+                "give the rotation axis (x, y, z) where the rotor turns about another",
             )
         )
         return 0.0, 0.0, 1.0

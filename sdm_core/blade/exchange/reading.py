@@ -82,7 +82,8 @@ def read_matrix_model(
     sources
         The files: matrices, and companion tables where the format has no place for the map of degrees of
         freedom (CSV ``node,component``), places of nodes (``node,x_m,y_m,z_m``) or speeds
-        (``speed_hz,stiffness``). One file of a CalculiX job brings the others beside it.
+        (``speed_hz,stiffness``). A file of a CalculiX job brings those beside it
+        whose kind is not among the files.
     format
         Of all files but companion tables; by their suffixes where left out.
     stiffness
@@ -123,8 +124,11 @@ def read_matrix_model(
     system = units_of(units)
     paths = _paths(sources)
     found = []
-    if len(paths) == 1 and paths[0].suffix.lower() in (".sti", ".mas"):
-        beside = companions(paths[0])
+    jobs = [path for path in paths if path.suffix.lower() in (".sti", ".mas")]
+    if jobs:
+        # Of several jobs on one mesh, one mass and one map are enough: those given come first.
+        given = {path.suffix.lower() for path in paths}
+        beside = [other for other in companions(jobs[0]) if other.suffix.lower() not in given]
         paths += beside
         if beside:
             found.append(note("files", "read with " + ", ".join(path.name for path in beside)))

@@ -21,7 +21,7 @@ from sdm_core.blade.exchange.triplets.matrix_market import write_matrix_market
 from sdm_core.blade.exchange.universal.write import write_universal
 from sdm_core.blade.matrix_model import MatrixModel
 from sdm_core.blade.modal import Blade
-from sdm_core.errors import InvalidInput
+from sdm_core.whole_files import staged
 
 
 @dataclass(frozen=True)
@@ -57,37 +57,35 @@ def write_model(model: MatrixModel, path: str | Path, *, format: str | None = No
     """
     path = Path(path)
     chosen = format_of(path, format, what=MATRICES, to_write=True)
-    left_out: tuple[str, ...] = ()
-    moved = any(state.static_displacement is not None for state in model.states)
-    try:
-        if chosen.name in ("op4", "op4-ascii"):
-            write_op4(model, path, binary=chosen.name == "op4")
-            paths: tuple[Path, ...] = (path,)
-            left_out = ("name",)
-        elif chosen.name in ("mat", "mat7.3"):
-            write_mat(arrays_of_model(model), path, version="5" if chosen.name == "mat" else "7.3")
-            paths, left_out = (path,), ("name",)
-        elif chosen.name == "npz":
-            write_npz_model(model, path)
-            paths = (path,)
-        elif chosen.name == "dmig":
-            write_dmig(model, path)
-            paths = (path,)
-            left_out = ("name", *(("static_displacement",) if moved else ()))
-        else:
-            left_out = ("name", *(("static_displacement",) if moved else ()), "rotation_axis")
-            if chosen.name == "calculix":
-                paths = write_calculix(model, path)
-                table = path.with_suffix(".speeds.csv")
-                files = [written.name for written in paths if written.suffix == ".sti"]
-                speeds = [float(state.speed_hz) for state in model.states]
-                write_table(table, SPEEDS, list(zip(speeds, files, strict=True)))
-                paths = (*paths, table)
-            else:
-                paths = _one_matrix_a_file(model, path, chosen.name)
-    except OSError as error:
-        raise InvalidInput("path", str(path), f"it cannot be written ({error.strerror})") from None
-    return Written(paths, left_out, chosen.digits)
+    with staged(path) as beside:
+        written, left_out = _write_model(model, beside, chosen.name)
+    return Written(tuple(path.with_name(made.name) for made in written), left_out, chosen.digits)
+
+
+def _write_model(model: MatrixModel, path: Path, name: str) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """The files of one format, and what they leave out."""
+    moved = ("static_displacement",) if any(s.static_displacement is not None for s in model.states) else ()
+    if name in ("op4", "op4-ascii"):
+        write_op4(model, path, binary=name == "op4")
+        return (path,), ("name",)
+    if name in ("mat", "mat7.3"):
+        write_mat(arrays_of_model(model), path, version="5" if name == "mat" else "7.3")
+        return (path,), ("name",)
+    if name == "npz":
+        write_npz_model(model, path)
+        return (path,), ()
+    if name == "dmig":
+        write_dmig(model, path)
+        return (path,), ("name", *moved)
+    left_out = ("name", *moved, "rotation_axis")
+    if name != "calculix":
+        return _one_matrix_a_file(model, path, name), left_out
+    paths = write_calculix(model, path)
+    table = path.with_suffix(".speeds.csv")
+    files = [written.name for written in paths if written.suffix == ".sti"]
+    speeds = [float(state.speed_hz) for state in model.states]
+    write_table(table, SPEEDS, list(zip(speeds, files, strict=True)))
+    return (*paths, table), left_out
 
 
 def _one_matrix_a_file(model: MatrixModel, path: Path, name: str) -> tuple[Path, ...]:
@@ -130,17 +128,16 @@ def export_blade(blade: Blade, path: str | Path, *, format: str | None = None) -
     path = Path(path)
     chosen = format_of(path, format, what=MODAL, to_write=True)
     left_out: tuple[str, ...] = ()
-    try:
+    with staged(path) as beside:
         if chosen.name == "json":
-            write_blade(blade, path)
+            write_blade(blade, beside)
         elif chosen.name == "npz":
-            write_npz_blade(blade, path)
+            write_npz_blade(blade, beside)
         elif chosen.name in ("mat", "mat7.3"):
-            write_mat({"blade": arrays_of_blade(blade)}, path, version="5" if chosen.name == "mat" else "7.3")
+            version = "5" if chosen.name == "mat" else "7.3"
+            write_mat({"blade": arrays_of_blade(blade)}, beside, version=version)
         elif chosen.name == "csv":
-            write_csv_modal(blade, path)
+            write_csv_modal(blade, beside)
         else:
-            left_out = write_universal(blade, path)
-    except OSError as error:
-        raise InvalidInput("path", str(path), f"it cannot be written ({error.strerror})") from None
+            left_out = write_universal(blade, beside)
     return Written((path,), left_out, chosen.digits)

@@ -18,6 +18,8 @@ TOLERANCE = 1e-10
 ROUNDING = 1e-7
 _MOST_ITERATIONS = 16
 _DIVERGED = 1e6
+# Over all steps of the load: real blades take 5 to 10.
+MOST_ITERATIONS_IN_ALL = 100
 # Smallest share of the load taken in one step before giving up.
 _SMALLEST_STEP = 1 / 256
 
@@ -87,17 +89,23 @@ def equilibrium(
         if found is None:
             step *= 0.5
             if step < _SMALLEST_STEP:
-                raise NoEquilibrium(
-                    "speed_hz",
-                    speed_hz,
-                    f"no equilibrium found beyond {np.sqrt(reached) * speed_hz:.4g} Hz: lower the speed, or "
-                    "stiffen the blade",
-                )
+                raise _none_beyond(reached, speed_hz)
             continue
         u, tangent, unbalance, iterations = found
         count += iterations
+        if count > MOST_ITERATIONS_IN_ALL and target < 1.0:
+            raise _none_beyond(target, speed_hz)
         reached = target
     return Equilibrium(speed_hz, u, tangent, unbalance, count)
+
+
+def _none_beyond(reached: float, speed_hz: float) -> NoEquilibrium:
+    return NoEquilibrium(
+        "rotor speed",
+        f"{speed_hz:.5g} Hz",
+        f"no equilibrium found beyond {np.sqrt(reached) * speed_hz:.4g} Hz: lower the design speed, or "
+        "stiffen the blade",
+    )
 
 
 def _newton(

@@ -20,6 +20,8 @@ from sdm_core.validation import LARGEST_DAMPING, SPEED_LIMITS_HZ, number, vector
 # that covers the whole range and a little overspeed.
 STATE_SHARES = (0.0, 0.7, 1.05)
 MOST_MODES = 20
+# m/s; compressors and fans stay below 600, and no disk holds more.
+FASTEST_TIP = 1000.0
 MOST_STATES = 9
 
 
@@ -83,6 +85,15 @@ class BladeProfile:
         put(self, "edge_cut", number("edge_cut", self.edge_cut, 0.0, 0.2, "of the chord"))
         if self.speeds_hz is not None:
             put(self, "speeds_hz", _speeds(self.speeds_hz))
+        radius = max(float(side[..., 1].max()) for side in self.sections().sides)
+        for field_name, speed in (("design_speed_hz", design), ("speeds_hz", max(self.state_speeds_hz))):
+            tip_speed = 2 * np.pi * speed * radius
+            if tip_speed > FASTEST_TIP:
+                raise InvalidInput(
+                    field_name,
+                    speed,
+                    f"the tip would move at {tip_speed:,.0f} m/s: give revolutions per second (Hz), not rpm",
+                )
 
     @property
     def state_speeds_hz(self) -> tuple[float, ...]:

@@ -128,7 +128,7 @@ def read_profile(path: str | Path) -> BladeProfile:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise InvalidInput("profile file", str(path), "give a file under 64 MiB")
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InvalidInput("profile file", str(path), f"give a readable file ({error.strerror})") from None
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
@@ -151,7 +151,12 @@ def _shape(data: Mapping[str, Any], folder: Path | None) -> ParametricBlade | Se
         for key in ("stacking", "edge_cut"):
             if data.get(key) is not None:
                 raise InvalidInput(key, data[key], "it goes with sections; parametric has its own edge_cut")
-        return _part(data, "parametric", ParametricBlade)
+        blade = _part(data, "parametric", ParametricBlade)
+        try:
+            blade.sections()
+        except InvalidInput as error:
+            raise error.under("parametric") from None
+        return blade
     table = _sections(sections, folder)
     return table.stacked_on_centroids() if stacking == "centroids" else table
 

@@ -209,3 +209,20 @@ def test_any_parameters_give_sections_or_a_named_refusal(parameters):
         assert error.field and error.remedy
     else:
         assert all(np.isfinite(side).all() for side in sections.sides)
+
+
+def test_revolutions_per_minute_given_as_hertz_are_recognised_by_the_tip_speed():
+    with pytest.raises(InvalidInput, match=r"design_speed_hz = 17000.0: the tip would move at .* not rpm"):
+        replace(coarse_blade(), design_speed_hz=17_000.0)
+
+
+def test_a_profile_with_a_byte_order_mark_is_read(tmp_path):
+    document = json.dumps(profile_to_dict(coarse_blade()))
+    (tmp_path / "p.json").write_text(document, encoding="utf-8-sig")
+    assert read_profile(tmp_path / "p.json") == coarse_blade()
+
+
+def test_sections_that_hub_and_casing_cut_off_are_refused_when_they_are_read():
+    document = profile_to_dict(coarse_blade(casing_slope=-1.4, chord_m=0.2))
+    with pytest.raises(InvalidInput, match=r"parametric.casing_slope"):
+        profile_from_dict(document)

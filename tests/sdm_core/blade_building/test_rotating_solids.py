@@ -110,7 +110,7 @@ def test_assembly_is_that_of_the_library_term_by_term():
 def test_a_blade_too_soft_for_its_speed_is_refused_with_the_speed_it_can_bear():
     soft = Material(1e7, 0.3, 8000.0)
     arched = SolidMesh.of(_bow, Subdivision(1, 8, 1))
-    with pytest.raises(NoEquilibrium, match="lower the speed"):
+    with pytest.raises(NoEquilibrium, match="lower the design speed"):
         equilibrium(SolidModel(arched, soft), 2000.0)
 
 

@@ -207,7 +207,7 @@ def overflowing(model):
     ("damage", "words"),
     [
         (unsymmetric, ("K.csv", "unsymmetric", "symmetric")),
-        (indefinite_mass, ("mass", "positive definite")),
+        (indefinite_mass, ("mass", "negative eigenvalue")),
         (exchanged, ("diagonal",)),
         (nan_entry, ("K.csv", "nan")),
         (infinite_entry, ("M.csv", "inf")),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
-from scipy.sparse import csc_array, issparse
+from scipy.sparse import csc_array, diags_array, issparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from sdm_core.blade.matrix_model import DENSE_UP_TO, Matrix
@@ -17,6 +17,8 @@ LARGEST_ASYMMETRY = 1e-6
 # Eigenvalues of rigid motion come out as rounding of the highest: below this share of ω²_max they are zero.
 RIGID_SHARE = 1e-13
 SHOWN_MODES = 6
+# Of a mass scaled to a unit diagonal, what is no more than rounding.
+NO_MASS = 1e-10
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def symmetrised(where: str, matrix: Matrix) -> tuple[Matrix, float]:
 
 
 def check_mass(where: str, mass: Matrix, row_name: list[str]) -> None:
-    """A mass is positive definite.
+    """A mass has no negative direction; one without mass (incompatible modes have such) is allowed.
 
     Raises
     ------
@@ -92,15 +94,15 @@ def check_mass(where: str, mass: Matrix, row_name: list[str]) -> None:
     # Scaled to a unit diagonal, so that units and rotations do not decide.
     scale = diagonal**-0.5
     if issparse(mass) and mass.shape[0] > DENSE_UP_TO:
-        negative = _negative(csc_array(mass))
+        negative = _negative(csc_array(mass + diags_array(NO_MASS * diagonal)))
     else:
         dense = (mass.toarray() if issparse(mass) else mass) * scale[:, None] * scale[None, :]
-        negative = int((linalg.eigvalsh(dense) <= 1e-14).sum())
+        negative = int((linalg.eigvalsh(dense) < -NO_MASS).sum())
     if negative:
         raise InvalidInput(
             where,
-            f"{negative} eigenvalues that are not positive",
-            "a mass is positive definite: is this the stiffness, or a damaged file?",
+            f"{negative} negative eigenvalues",
+            "a mass has none: is this the stiffness, or a damaged file?",
         )
 
 
@@ -111,10 +113,16 @@ def spectrum(where: str, stiffness: Matrix, mass: Matrix) -> Spectrum:
         k, m = (x.toarray() if issparse(x) else x for x in (stiffness, mass))
         try:
             omega2 = linalg.eigh(k, m, eigvals_only=True)
-        except linalg.LinAlgError:
-            raise InvalidInput(
-                where, f"{size} × {size}", "its modes cannot be computed: check mass"
-            ) from None
+        except (
+            linalg.LinAlgError
+        ):  # directions without mass: 1/ω² is found instead, which a held blade allows
+            try:
+                compliance = linalg.eigh(m, k, eigvals_only=True)
+            except linalg.LinAlgError:
+                raise InvalidInput(
+                    where, f"{size} × {size}", "its modes cannot be computed: check mass, clamp the root"
+                ) from None
+            omega2 = 1.0 / compliance[compliance > NO_MASS * compliance.max()][::-1]
         zero = RIGID_SHARE * size * float(np.abs(omega2).max())
         elastic = omega2[omega2 > zero][:SHOWN_MODES]
         return Spectrum(
