@@ -223,6 +223,7 @@ def test_a_profile_with_a_byte_order_mark_is_read(tmp_path):
 
 
 def test_sections_that_hub_and_casing_cut_off_are_refused_when_they_are_read():
-    document = profile_to_dict(coarse_blade(casing_slope=-1.4, chord_m=0.2))
+    document = profile_to_dict(coarse_blade())
+    document["parametric"] |= {"casing_slope": -1.4, "chord_m": 0.2}
     with pytest.raises(InvalidInput, match=r"parametric.casing_slope"):
         profile_from_dict(document)
