@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sdm_core.blade.exchange.nastran.op4 import CUT_OFF, REAL_SINGLE, checked_header, unpacked
+from sdm_core.blade.exchange.nastran.op4_matrix import CUT_OFF, REAL_SINGLE, checked_header, unpacked
 from sdm_core.blade.matrix_model import Matrix
 from sdm_core.errors import DamagedFile
 
