@@ -16,6 +16,7 @@ MEASUREMENTS = {
     "profiles": "benchmarks.profile_folder",
     "rotor37": "benchmarks.rotor_37_blade",
     "accuracy": "benchmarks.screening_accuracy",
+    "certificate": "benchmarks.certificate",
     "speed": "benchmarks.map_speed",
 }
 

@@ -12,7 +12,11 @@ from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
 
 
 class Answerer(Protocol):
-    """Answers stability questions: a `training.screening.Screener` or a `service.client.Client`."""
+    """Answers stability questions: a `training.screening.Screener` or a `service.client.Client`.
+
+    `alpha` is the rate of unstable designs called stable that the answers must keep; None leaves it to
+    the model.
+    """
 
     def points(
         self,
@@ -21,6 +25,7 @@ class Answerer(Protocol):
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> PointAnswers:
         """Verdicts at points (speed_hz[i], ke[i])."""
         ...
@@ -32,6 +37,7 @@ class Answerer(Protocol):
         speed_hz: np.ndarray,
         ke_max: float,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> BoundaryAnswers:
         """The first crossing at each speed."""
         ...
@@ -43,6 +49,7 @@ class Answerer(Protocol):
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> MapAnswers:
         """Verdicts on the grid of speeds and stiffnesses."""
         ...

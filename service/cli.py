@@ -55,10 +55,11 @@ def rubscreen(
     """Screen turbomachinery blades for rub-induced instability."""
 
 
-for command in (demo, serve, screen, assess, map, boundary, train, models, paper):
+for command in (demo, serve, screen, assess, map, boundary, train, paper):
     app.command(command.__name__.rpartition(".")[2])(command.run)
 
 app.add_typer(blade.app, name="blade")
+app.add_typer(models.app, name="models")
 
 
 if __name__ == "__main__":

@@ -81,6 +81,7 @@ class Client:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> PointAnswers:
         """Verdicts at points (``POST /v1/stability``).
 
@@ -90,7 +91,7 @@ class Client:
             When the service refuses or cannot be reached.
         """
         speed, stiffness = np.asarray(speed_hz, dtype=float), np.asarray(ke, dtype=float)
-        question = _question(blade, contact, policy, speed_hz=speed, ke=stiffness)
+        question = _question(blade, contact, policy, alpha, speed_hz=speed, ke=stiffness)
         return self._ask(
             "POST", "/v1/stability", question, lambda reply: replies.points_from_dict(reply, speed, stiffness)
         )
@@ -104,10 +105,11 @@ class Client:
         speed_hz: np.ndarray,
         ke_max: float,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> BoundaryAnswers:
         """First crossings (``POST /v1/boundary``); raises like `points`."""
         speed = np.asarray(speed_hz, dtype=float)
-        question = _question(blade, contact, policy, speed_hz=speed, ke_max=ke_max)
+        question = _question(blade, contact, policy, alpha, speed_hz=speed, ke_max=ke_max)
         return self._ask(
             "POST", "/v1/boundary", question, lambda reply: replies.boundary_from_dict(reply, speed, ke_max)
         )
@@ -119,10 +121,11 @@ class Client:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> MapAnswers:
         """Verdicts on a grid (``POST /v1/map``, as npz); raises like `points`."""
         speed, stiffness = np.asarray(speed_hz, dtype=float), np.asarray(ke, dtype=float)
-        question = _question(blade, contact, policy, speed_hz=speed, ke=stiffness)
+        question = _question(blade, contact, policy, alpha, speed_hz=speed, ke=stiffness)
         response = self._response("POST", "/v1/map", question, "application/x-npz")
         try:
             return replies.map_from_npz(response.content)
@@ -162,8 +165,11 @@ class Client:
         raise ServiceProblem(_problem(response))
 
 
-def _question(blade: Blade, contact: ContactConfiguration, policy: str, **asked: Any) -> Json:
-    return {"blade": blade_to_dict(blade), "contact": contact.to_dict(), "policy": policy, **asked}
+def _question(
+    blade: Blade, contact: ContactConfiguration, policy: str, alpha: float | None, **asked: Any
+) -> Json:
+    said = {"policy": policy} if alpha is None else {"policy": policy, "alpha": alpha}
+    return {"blade": blade_to_dict(blade), "contact": contact.to_dict(), **said, **asked}
 
 
 def _problem(response: httpx.Response) -> Json:

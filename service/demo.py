@@ -119,9 +119,10 @@ class TimedMaps:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> PointAnswers:
         """As the inner one."""
-        return self._inner.points(blade, contact, speed_hz, ke, policy)
+        return self._inner.points(blade, contact, speed_hz, ke, policy, alpha)
 
     def boundary(
         self,
@@ -130,9 +131,10 @@ class TimedMaps:
         speed_hz: np.ndarray,
         ke_max: float,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> BoundaryAnswers:
         """As the inner one."""
-        return self._inner.boundary(blade, contact, speed_hz, ke_max, policy)
+        return self._inner.boundary(blade, contact, speed_hz, ke_max, policy, alpha)
 
     def map(
         self,
@@ -141,10 +143,11 @@ class TimedMaps:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> MapAnswers:
         """As the inner one, timed."""
         began = time.perf_counter()
-        answers = self._inner.map(blade, contact, speed_hz, ke, policy)
+        answers = self._inner.map(blade, contact, speed_hz, ke, policy, alpha)
         self.seconds.append(time.perf_counter() - began)
         return answers
 

@@ -13,6 +13,29 @@ POLICIES = ("auto", "surrogate", "exact")
 
 
 @dataclass(frozen=True)
+class CertificateUsed:
+    """The bound under which the surrogate answered.
+
+    Attributes
+    ----------
+    alpha
+        Bound on P(unstable | answered stable by the surrogate), ...
+    confidence
+        ... which holds with this confidence ...
+    distribution
+        ... on blades, speeds and stiffnesses drawn from the distribution of this name.
+    spreads
+        Half width of the band about the predicted boundary that the exact core verified, in learned
+        spreads.
+    """
+
+    alpha: float
+    confidence: float
+    distribution: str
+    spreads: float
+
+
+@dataclass(frozen=True)
 class PointAnswers:
     """Verdicts at m points (speed, K_e).
 
@@ -31,6 +54,8 @@ class PointAnswers:
         Arrays of str, shape (m,).
     model, solver
         Identifier of the surrogate (or None) and name of the exact method.
+    certificate
+        What the surrogate's answers hold under; None where there are none, or none were verified.
     """
 
     speed_hz: np.ndarray
@@ -47,6 +72,7 @@ class PointAnswers:
     reason: np.ndarray
     model: str | None
     solver: str
+    certificate: CertificateUsed | None = None
 
     @property
     def exact_share(self) -> float:
@@ -69,6 +95,8 @@ class BoundaryAnswers:
     unstable_ke
         For exact answers every interval of instability below `ke_max` as (low, high), N/m;
         None where the surrogate answered.
+    certificate
+        As in `PointAnswers`; here the band decides where the surrogate is sure enough.
     """
 
     speed_hz: np.ndarray
@@ -81,6 +109,7 @@ class BoundaryAnswers:
     reason: np.ndarray
     model: str | None
     solver: str
+    certificate: CertificateUsed | None = None
 
     @property
     def exact_share(self) -> float:
@@ -100,6 +129,8 @@ class MapAnswers:
         The surrogate's; NaN where the exact core answered.
     source, reason
         Arrays of str, shape (b, a).
+    certificate
+        As in `PointAnswers`.
     """
 
     speed_hz: np.ndarray
@@ -110,6 +141,7 @@ class MapAnswers:
     reason: np.ndarray
     model: str | None
     solver: str
+    certificate: CertificateUsed | None = None
 
     @property
     def exact_share(self) -> float:

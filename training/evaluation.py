@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from training.calibration import VerificationBand
 from training.surrogate import PredictedBoundary
+from training.verification_band import VerificationBand
 
 HARD = 0.25  # within this of the boundary in K_e a point is hard
 

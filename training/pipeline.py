@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
 
 from sdm_core.version import __version__
-from training.calibration import calibrate
+from training.calibration import CalibrationSettings, Progress, calibrated
 from training.dataset import Dataset
 from training.design_space import DesignSpace
-from training.evaluation import Evaluation, evaluate
+from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
 from training.labelling import KAPPA_MAX, critical_kappa
-from training.reference_space import NAME, reference_sample
 from training.registry import Model, write_model
-
-Progress = Callable[[str, int, int, str], None]
-"""Called with (stage, done, of, remark)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +29,7 @@ class TrainingSettings:
     calibration_points, evaluation_points
         Independent points of the reference design space.
     seed
-        Of everything; evaluation and calibration use seeds derived from it.
+        Of everything; calibration and evaluation each have a seed of their own derived from it.
     threads
         Torch threads and labelling processes. With seed, thread count and machine the same, so
         are the figures.
@@ -42,7 +37,7 @@ class TrainingSettings:
 
     designs: int = 32_768
     speeds_each: int = 6
-    calibration_points: int = 20_000
+    calibration_points: int = 200_000
     evaluation_points: int = 20_000
     seed: int = 2013
     threads: int = 2
@@ -111,15 +106,9 @@ def train(
         torch.set_num_threads(before)
     lap("fit")
 
-    sample, critical, unstable = _truth(s.calibration_points, s.seed + 1, s.threads, "calibrate", progress)
-    band = calibrate(surrogate.boundary(sample.cases), sample.ke, unstable, distribution=NAME)
-    lap("calibrate")
-
-    sample, critical, unstable = _truth(s.evaluation_points, s.seed + 2, s.threads, "evaluate", progress)
-    inside = s.design_space.contains(sample.cases)
-    found = surrogate.boundary(sample.cases)
-    evaluation = evaluate(found, band, inside, sample.ke, critical, unstable, distribution=NAME)
-    lap("evaluate")
+    points = CalibrationSettings(s.calibration_points, s.evaluation_points, s.seed, s.threads)
+    calibration = calibrated(surrogate, s.design_space, points, progress)
+    lap("calibrate and evaluate")
 
     card = {
         "code_version": __version__,
@@ -127,11 +116,12 @@ def train(
         "threads": s.threads,
         "dataset": {"sha256": dataset.digest, **dataset.provenance},
         "fit": s.fit.to_dict(),
-        "evaluation": {**evaluation.to_dict(), "seed": s.seed + 2},
-        "calibration": {"points": s.calibration_points, "seed": s.seed + 1},
+        **calibration.card(),
     }
-    model = write_model(surrogate, s.design_space, band, card, models_folder, activate=activate)
-    return TrainingResult(model, evaluation, dataset_path, seconds)
+    model = write_model(
+        surrogate, s.design_space, calibration.certificates, card, models_folder, activate=activate
+    )
+    return TrainingResult(model, calibration.evaluation, dataset_path, seconds)
 
 
 def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
@@ -153,12 +143,3 @@ def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
         "code_version": __version__,
     }
     return Dataset(cases, kappa, provenance)
-
-
-def _truth(points: int, seed: int, workers: int, stage: str, progress: Progress):
-    sample = reference_sample(points, seed)
-    kappa = critical_kappa(
-        sample.cases, workers=workers, progress=lambda done, of: progress(stage, done, of, "exact core")
-    )
-    critical = kappa * sample.cases.stiffness_scale
-    return sample, critical, sample.ke > critical

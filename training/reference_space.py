@@ -11,7 +11,7 @@ from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from training.cases import CaseBatch
 
-NAME = "reference/1, permanent contact"
+NAME = "reference/1"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,25 +14,31 @@ import safetensors.torch
 from safetensors import SafetensorError
 
 from sdm_core.errors import DamagedFile, InvalidInput
-from training.calibration import VerificationBand
+from training.certificate import Certificate
 from training.design_space import DesignSpace
 from training.features import feature_names
 from training.surrogate import Architecture, BoundaryNetwork, Surrogate
 
-FORMAT = "rubscreen/model/1"
+FORMAT = "rubscreen/model/2"
+# Cards before certificates of several rates: their weights are as good, once they are recalibrated.
+_UNCERTIFIED_FORMAT = "rubscreen/model/1"
 SHIPPED = Path(__file__).parent / "models"
 _WEIGHTS, _CARD, _ACTIVE = "model.safetensors", "card.json", "active"
 
 
 @dataclass(frozen=True)
 class Model:
-    """Everything needed to answer: network, domain, verification band, card."""
+    """Everything needed to answer: network, domain, certificates, card."""
 
     id: str
     surrogate: Surrogate
     design_space: DesignSpace
-    band: VerificationBand
+    certificates: tuple[Certificate, ...]
     card: dict[str, Any]
+
+    def certificate(self, contact: str) -> Certificate | None:
+        """The certificate served for a class of contact, the card's first of it; None where there is none."""
+        return next((found for found in self.certificates if found.contact == contact), None)
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class ModelEntry:
 def write_model(
     surrogate: Surrogate,
     design_space: DesignSpace,
-    band: VerificationBand,
+    certificates: Sequence[Certificate],
     card: dict[str, Any],
     folder: Path = SHIPPED,
     *,
@@ -64,7 +71,7 @@ def write_model(
         "architecture": surrogate.architecture.to_dict(),
         "features": list(feature_names()),
         "design_space": design_space.to_dict(),
-        "verification_band": band.to_dict(),
+        "certificates": [certificate.to_dict() for certificate in certificates],
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
     text = json.dumps(full, indent=1, sort_keys=True) + "\n"
@@ -80,11 +87,16 @@ def write_model(
         pointer = folder / f".{_ACTIVE}.{os.getpid()}.partial"
         pointer.write_text(model_id + "\n", encoding="utf-8")
         pointer.replace(folder / _ACTIVE)
-    return Model(model_id, surrogate, design_space, band, full)
+    return Model(model_id, surrogate, design_space, tuple(certificates), full)
 
 
-def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
+def load_model(model_id: str | None = None, folder: Path = SHIPPED, *, certified: bool = True) -> Model:
     """Load a model; None is the active one.
+
+    Parameters
+    ----------
+    certified
+        False also takes a model whose card is of an age without certificates, to give it one.
 
     Raises
     ------
@@ -99,7 +111,7 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
         raise InvalidInput(
             "model", chosen, f"name one of {', '.join(_ids(folder)) or 'none: train one first'}"
         )
-    card, text = _read_card(place)
+    card, text = _read_card(place, certified)
     try:
         weights = (place / _WEIGHTS).read_bytes()
     except OSError as error:
@@ -121,10 +133,10 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED) -> Model:
         network = BoundaryNetwork(architecture)
         network.load_state_dict(safetensors.torch.load(weights))
         space = DesignSpace.from_dict(card["design_space"])
-        band = VerificationBand(**card["verification_band"])
+        certificates = tuple(Certificate.from_dict(data) for data in card.get("certificates", ()))
     except (SafetensorError, RuntimeError, TypeError, KeyError) as error:
         raise DamagedFile("model", str(place), f"its files do not fit together ({error}); {_MEND}") from None
-    return Model(chosen, Surrogate(network, architecture), space, band, card)
+    return Model(chosen, Surrogate(network, architecture), space, certificates, card)
 
 
 _MEND = "restore it from the distribution, train again with `rubscreen train`, or activate another model"
@@ -165,16 +177,20 @@ def _ids(folder: Path) -> list[str]:
     return sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "_")))
 
 
-def _read_card(place: Path) -> tuple[dict[str, Any], str]:
+def _read_card(place: Path, certified: bool) -> tuple[dict[str, Any], str]:
     try:
         text = (place / _CARD).read_text(encoding="utf-8")
         card = json.loads(text)
     except (OSError, ValueError) as error:
         raise DamagedFile("model", str(place / _CARD), f"cannot be read ({error}); {_MEND}") from None
-    if not isinstance(card, dict) or card.get("format") != FORMAT:
+    known = card.get("format") if isinstance(card, dict) else None
+    if known == _UNCERTIFIED_FORMAT and certified:
+        remedy = f"it has no certificates: run `rubscreen models recalibrate {place.name}`"
+        raise DamagedFile("model", str(place / _CARD), remedy)
+    if known not in (FORMAT, _UNCERTIFIED_FORMAT):
         raise DamagedFile("model", str(place / _CARD), f"it is not a {FORMAT} card; {_MEND}")
-    needed = ("weights_sha256", "features", "architecture", "design_space", "verification_band")
-    for key in needed:
+    needed = ["weights_sha256", "features", "architecture", "design_space"]
+    for key in (*needed, "certificates") if known == FORMAT else needed:
         if key not in card:
             raise DamagedFile("model", str(place / _CARD), f"{key} is missing; {_MEND}")
     return card, text

@@ -26,13 +26,16 @@ from training.answers import (
     REQUESTED,
     SURROGATE,
     BoundaryAnswers,
+    CertificateUsed,
     MapAnswers,
     PointAnswers,
 )
-from training.calibration import VerificationBand
 from training.cases import CaseBatch
+from training.certificate import Certificate
+from training.contact_class import contact_class, in_words
 from training.registry import SHIPPED, Model, load_model
 from training.surrogate import PredictedBoundary
+from training.verification_band import VerificationBand
 
 # A boundary is answered by the surrogate where its band is narrower than this in log10 K_e (5 %).
 _SURE_BOUNDARY = float(np.log10(1.05))
@@ -82,21 +85,33 @@ class Screener:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> PointAnswers:
         """Verdicts at points (speed_hz[i], ke[i]).
 
         Exact answers also give spectral radius, growth, chatter frequency and error estimate.
 
+        Parameters
+        ----------
+        policy
+            Who answers: "auto" is the surrogate where it is sure, else the exact core.
+        alpha
+            Rate of unstable designs among those called stable that "auto" must keep; the model is certified
+            for some rates, and None is the
+            certificate's own default. Exact answers keep any.
+
         Raises
         ------
         InvalidInput
-            For unusable input, or `policy` "surrogate" outside the domain.
+            For unusable input, `policy` "surrogate" outside the domain, an `alpha` without a certificate,
+            or one with `policy` "surrogate", which keeps none.
         TooMuchWork
             When the exact core would have to answer too many points.
         """
         speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
         if len(speed) != len(stiffness):
             raise InvalidInput("ke", f"{len(stiffness)} numbers", f"give one a speed: {len(speed)}")
+        band, certificate = self._band(contact, policy, alpha)
         predicted, reason = self._predicted(blade, contact, speed, policy)
         if predicted is None:
             probability, stable = np.full(len(speed), np.nan), np.full(len(speed), np.nan)
@@ -104,7 +119,7 @@ class Screener:
             probability = predicted.unstable_probability(stiffness)
             stable = (probability < 0.5).astype(float)
             if policy == "auto":
-                near = self._band.verify(predicted, stiffness)
+                near = band.verify(predicted, stiffness)
                 reason[(reason == CONFIDENT) & near] = NEAR_BOUNDARY
         exact = self._exact_rows(reason, policy)
         self._allow(exact.sum(), _POINT_S, blade, speed)
@@ -140,6 +155,7 @@ class Screener:
             reason,
             self.model_id,
             CHARACTERISTIC,
+            certificate if predicted is not None else None,
         )
 
     def boundary(
@@ -149,17 +165,19 @@ class Screener:
         speed_hz: np.ndarray,
         ke_max: float,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> BoundaryAnswers:
         """First crossing at each speed; raises as `points`."""
         speed = speeds("speed_hz", speed_hz)
         ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+        band, certificate = self._band(contact, policy, alpha)
         predicted, reason = self._predicted(blade, contact, speed, policy)
         critical, chatter, error = (np.full(len(speed), np.nan) for _ in range(3))
         if predicted is not None:
             with np.errstate(over="ignore"):
                 critical = np.where(predicted.log_ke <= np.log10(ke_max), 10.0**predicted.log_ke, np.nan)
-            width = self._band.half_width(predicted)
-            error = 10.0 ** (self._band.spreads * predicted.spread) - 1
+            width = band.half_width(predicted)
+            error = 10.0 ** (band.spreads * predicted.spread) - 1
             if policy == "auto":
                 doubtful = width > _SURE_BOUNDARY
                 doubtful &= predicted.log_ke - width < np.log10(ke_max)  # else none below, for sure
@@ -186,6 +204,7 @@ class Screener:
             reason,
             self.model_id,
             _solver(contact),
+            certificate if predicted is not None else None,
         )
 
     def map(
@@ -195,9 +214,11 @@ class Screener:
         speed_hz: np.ndarray,
         ke: np.ndarray,
         policy: str = "auto",
+        alpha: float | None = None,
     ) -> MapAnswers:
         """Verdicts on the grid of speeds (a,) and stiffnesses (b,); raises as `points`."""
         speed, stiffness = speeds("speed_hz", speed_hz), stiffnesses("ke", ke)
+        band, certificate = self._band(contact, policy, alpha)
         predicted, reason_of_speed = self._predicted(blade, contact, speed, policy)
         shape = (len(stiffness), len(speed))
         reason = np.broadcast_to(reason_of_speed, shape).copy()
@@ -208,7 +229,7 @@ class Screener:
             probability = predicted.unstable_probability(column)
             stable = (probability < 0.5).astype(float)
             if policy == "auto":
-                reason[(reason == CONFIDENT) & self._band.verify(predicted, column)] = NEAR_BOUNDARY
+                reason[(reason == CONFIDENT) & band.verify(predicted, column)] = NEAR_BOUNDARY
         exact = self._exact_rows(reason, policy)
         if contact.permanent:  # one solve decides a whole column
             self._allow(exact.any(axis=0).sum(), _PERMANENT_S, blade, speed)
@@ -227,19 +248,40 @@ class Screener:
             reason,
             self.model_id,
             _solver(contact),
+            certificate if predicted is not None else None,
         )
 
-    @property
-    def _band(self) -> VerificationBand:
-        assert self.model is not None
-        return self.model.band
+    def _band(
+        self, contact: ContactConfiguration, policy: str, alpha: float | None
+    ) -> tuple[VerificationBand, CertificateUsed | None]:
+        """What must be verified, and the certificate that "auto" then answers under.
+
+        Where the exact core answers everything, the band is as good as any and there is no certificate.
+        """
+        if policy not in POLICIES:
+            raise InvalidInput("policy", policy, f"give one of {', '.join(POLICIES)}")
+        if alpha is not None:
+            alpha = number("alpha", alpha, 0.0, 1.0, "", open_low=True)
+            if policy == "surrogate":
+                raise InvalidInput(
+                    "alpha", alpha, "the surrogate alone keeps no rate; use policy auto, or leave it out"
+                )
+        certificate = self._certificate(contact)
+        if policy == "exact" or certificate is None:
+            return VerificationBand(np.inf), None
+        line = certificate.line(alpha)
+        if policy == "surrogate":
+            return line.band, None
+        used = CertificateUsed(line.alpha, certificate.confidence, certificate.distribution, line.spreads)
+        return line.band, used
+
+    def _certificate(self, contact: ContactConfiguration) -> Certificate | None:
+        return None if self.model is None else self.model.certificate(contact_class(contact))
 
     def _predicted(
         self, blade: Blade, contact: ContactConfiguration, speed: np.ndarray, policy: str
     ) -> tuple[PredictedBoundary | None, np.ndarray]:
         """The surrogate's boundary (None where it is not to be asked) and the reason so far."""
-        if policy not in POLICIES:
-            raise InvalidInput("policy", policy, f"give one of {', '.join(POLICIES)}")
         reason = np.full(len(speed), REQUESTED, dtype="<U13")
         if policy == "exact":
             contact.weight_vector(blade.tip_nodes)
@@ -249,9 +291,8 @@ class Screener:
             raise InvalidInput("policy", policy, "no model is loaded: use policy exact, or train one")
         cases = CaseBatch.from_blade(blade, contact, speed)
         why = self.model.design_space.first_violation(cases)
-        if not contact.permanent:
-            pattern = "smooth engagement" if contact.smooth else "arcs of contact"
-            why[why == ""] = f"{pattern}, which this model does not cover"
+        if self._certificate(contact) is None:
+            why[why == ""] = f"{in_words(contact_class(contact))}, which this model does not cover"
         outside = why != ""
         if policy == "surrogate" and outside.any():
             i = int(np.argmax(outside))

@@ -200,8 +200,9 @@ class ContactReceptance:
         """
         h = self._modal(w, sets)
         matrix = self._matrix(h, sets)
-        # Where λ is right already H − λI is singular; so far off, the step still restores it.
-        start = (1.0 / guess) * (1 + 1e-11j)
+        # Where λ is right already H − λI is singular; so far off, the step still restores it. The second
+        # part keeps it off where λ is so much smaller than H that the first is lost in rounding.
+        start = (1.0 / guess) * (1 + 1e-11j) + 1e-14j * np.abs(matrix).max(axis=(1, 2))
         inverse = np.linalg.inv(matrix - start[:, None, None] * np.eye(self.rank))
         trace = np.trace(inverse, axis1=1, axis2=2)
         slope = self._matrix(self._modal_slope(h, w, sets), sets)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from service.commands.options import (
+    AlphaOption,
     ArcsOption,
     BladeArgument,
     EngagementOption,
@@ -43,6 +44,7 @@ def run(
     arcs: ArcsOption = None,
     engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
+    alpha: AlphaOption = None,
     url: UrlOption = None,
     models: ModelsOption = None,
     json: JsonOption = None,
@@ -71,7 +73,7 @@ def run(
         write_bytes,
         write_json,
     )
-    from service.commands.tables import critical_speeds_table
+    from service.commands.tables import critical_speeds_table, under
     from service.rest.replies import boundary_to_dict
     from service.screening.sweep import cut_off, searched, through_tips
     from service.speeds import evenly_spaced
@@ -87,7 +89,7 @@ def run(
     answerer = answerer_from(url, models, policy.value)
 
     with progress_bar("boundary") as progress:
-        wide, tips = searched(answerer, chosen, contact, grid, ke_max, policy.value, progress)
+        wide, tips = searched(answerer, chosen, contact, grid, ke_max, policy.value, progress, alpha)
     answers = cut_off(wide, ke_max)
 
     console = console_beside(json)
@@ -99,7 +101,7 @@ def run(
         console.print(f"{chosen.name}: none below {ke_max:g} N/m from {low:.4g} to {high:.4g} Hz")
     console.print(
         f"[dim]{len(grid)} speeds, {answers.exact_share:.1%} answered by the exact core, "
-        f"model {answers.model}, solver {answers.solver}[/dim]"
+        f"model {answers.model}{under(answers.certificate)}, solver {answers.solver}[/dim]"
     )
     if json:
         head = {"blade": chosen.name, "contact": contact.to_dict(), "ke_max": ke_max, "speed_hz": grid}

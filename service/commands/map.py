@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from service.commands.options import (
+    AlphaOption,
     ArcsOption,
     BladeArgument,
     EngagementOption,
@@ -44,6 +45,7 @@ def run(
     arcs: ArcsOption = None,
     engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
+    alpha: AlphaOption = None,
     url: UrlOption = None,
     models: ModelsOption = None,
     json: JsonOption = None,
@@ -73,6 +75,7 @@ def run(
         write_bytes,
         write_json,
     )
+    from service.commands.tables import under
     from service.rest.replies import map_to_dict, map_to_npz
     from service.speeds import evenly_spaced
 
@@ -87,9 +90,8 @@ def run(
     answerer = answerer_from(url, models, policy.value)
 
     began = time.perf_counter()
-    answers = answerer.map(
-        chosen, contact, evenly_spaced(low, high, shape[0]), np.linspace(0.0, ke_max, shape[1]), policy.value
-    )
+    grid_hz, grid_ke = evenly_spaced(low, high, shape[0]), np.linspace(0.0, ke_max, shape[1])
+    answers = answerer.map(chosen, contact, grid_hz, grid_ke, policy.value, alpha=alpha)
     seconds = time.perf_counter() - began
 
     console = console_beside(json)
@@ -97,7 +99,10 @@ def run(
         f"{chosen.name}: {answers.stable.size:,} points in {seconds:.2f} s, "
         f"{answers.unstable_share:.1%} unstable, {answers.exact_share:.1%} answered by the exact core"
     )
-    console.print(f"[dim]model {answers.model}, solver {answers.solver}, {low:.4g} to {high:.4g} Hz[/dim]")
+    console.print(
+        f"[dim]model {answers.model}{under(answers.certificate)}, solver {answers.solver}, "
+        f"{low:.4g} to {high:.4g} Hz[/dim]"
+    )
     if json:
         write_json(json, {"blade": chosen.name, "contact": contact.to_dict(), **map_to_dict(answers)})
     if npz:
@@ -111,8 +116,8 @@ def run(
         line = None
         if contact.permanent:
             drawn_by = "surrogate" if policy is Policy.surrogate else "exact"
-            grid_hz = lobe_grid(chosen, contact, answers.speed_hz, ke_max)
+            fine_hz = lobe_grid(chosen, contact, answers.speed_hz, ke_max)
             line = answerer.boundary(
-                chosen, contact, grid_hz, min(SEARCH_MARGIN * ke_max, KE_LIMIT), drawn_by
+                chosen, contact, fine_hz, min(SEARCH_MARGIN * ke_max, KE_LIMIT), drawn_by
             )
         write_bytes("--png", png, map_png(chosen, contact, answers, line, ke_liner=ke_liner))

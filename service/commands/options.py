@@ -84,6 +84,16 @@ PolicyOption = Annotated[
         rich_help_panel=ANSWERS,
     ),
 ]
+AlphaOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="RATE",
+        help="Rate of unstable designs called stable that auto must keep: 1e-2, 5e-3, 1e-3, 5e-4 or 1e-4, or "
+        "what the model's card has. Left out: 5e-4.",
+        rich_help_panel=ANSWERS,
+        show_default=False,
+    ),
+]
 UrlOption = Annotated[
     str | None,
     typer.Option(

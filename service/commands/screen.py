@@ -10,6 +10,7 @@ import typer
 from service.commands.options import (
     CONTACT,
     OUTPUT,
+    AlphaOption,
     ArcsOption,
     EngagementOption,
     JsonOption,
@@ -76,6 +77,7 @@ def run(
     arcs: ArcsOption = None,
     engagement: EngagementOption = None,
     policy: PolicyOption = Policy.auto,
+    alpha: AlphaOption = None,
     url: UrlOption = None,
     models: ModelsOption = None,
     json: JsonOption = None,
@@ -100,7 +102,8 @@ def run(
 ) -> None:
     """Smallest destabilising K_e of every blade and contact over the speed range, and where.
 
-    Of several blades, those that cannot be read or screened are listed with the reason, the rest ranked.
+    Of several blades, those that cannot be read or screened are listed with the reason, the rest ranked; the
+    exit code is 0 as long as one was screened.
 
     Example: rubscreen screen blades/ nasa_rotor_37 --ke-liner 9000 --html report.html
     """
@@ -136,6 +139,7 @@ def run(
             ke_liner=ke_liner,
             map_shape=shape,
             policy=policy.value,
+            alpha=alpha,
             progress=progress,
         )
     failures = (*loaded.failures, *unfit, *failed)

@@ -13,6 +13,7 @@ from service.screening.screen import UNSTABLE
 if TYPE_CHECKING:
     from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
+    from training.answers import CertificateUsed
 
 
 def critical_speeds_table(title: str, tips: Sequence[CriticalSpeed]) -> Table:
@@ -30,6 +31,16 @@ def critical_speeds_table(title: str, tips: Sequence[CriticalSpeed]) -> Table:
             f"{tip.lobes_per_revolution:.2f}",
         )
     return table
+
+
+def under(certificate: CertificateUsed | None) -> str:
+    """What to say behind the name of a model: the rate it keeps, and where; nothing where it keeps none."""
+    if certificate is None:
+        return ""
+    return (
+        f" (false stable below {certificate.alpha:g} on {certificate.distribution} "
+        f"with {certificate.confidence:.0%} confidence)"
+    )
 
 
 def ranking_table(report: ScreeningReport) -> Table:

@@ -36,10 +36,13 @@ def run(
     points: Annotated[
         int,
         typer.Option(
-            help="Independent points to calibrate on, and as many to evaluate on.",
-            min=10_000,
+            help="Independent points of the certificate; 1e-4 takes 92,000 at least.",
+            min=20_000,
             rich_help_panel=SIZE,
         ),
+    ] = 200_000,
+    evaluation_points: Annotated[
+        int, typer.Option(help="Further points to evaluate on.", min=1000, rich_help_panel=SIZE)
     ] = 20_000,
     activate: Annotated[bool, typer.Option(help="Make it the folder's active model.")] = True,
     json: Annotated[
@@ -57,8 +60,9 @@ def run(
 
     Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
     """
+    from service.commands.models import certificate_table
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
-    from training.calibration import CalibrationFailed
+    from training.certificate import CalibrationFailed
     from training.fit import FitSettings
     from training.pipeline import TrainingSettings, train
 
@@ -67,7 +71,7 @@ def run(
         designs=designs,
         speeds_each=speeds_each,
         calibration_points=points,
-        evaluation_points=points,
+        evaluation_points=evaluation_points,
         seed=seed,
         threads=threads,
         fit=FitSettings(epochs=epochs),
@@ -86,6 +90,8 @@ def run(
             f"rubscreen: no model was written: {error}. Give it more designs, epochs or points", err=True
         )
         raise typer.Exit(1) from None
+    for certificate in made.model.certificates:
+        console.print(certificate_table(certificate))
     console.print(_figures(made.evaluation))
     console.print(
         f"boundary error: median {made.evaluation.median_boundary_error:.2%}, "

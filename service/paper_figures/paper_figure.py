@@ -157,7 +157,7 @@ def newtons(ke: float) -> str:
 
 
 def _line(said: list[str], compared: int) -> str:
-    none = f"Nothing, of {compared} statements compared" if compared > 1 else "Nothing, of one statement compared"
+    none = f"Nothing, of {compared} statement{'s' if compared > 1 else ''} compared"
     line = "; ".join(said) if said else none
     return f"{line[0].upper()}{line[1:]}."
 

@@ -128,6 +128,11 @@ POLICY: Json = {
     "description": "Who answers: the surrogate where it is sure and inside its domain, else the exact core "
     "(auto); the surrogate alone; the exact core alone.",
 }
+ALPHA: Json = {
+    "oneOf": [{"type": "number", "exclusiveMinimum": 0, "maximum": 1}, {"type": "null"}],
+    "description": "Rate of unstable designs among those called stable that the answers must keep, under "
+    "policy auto: one of those the model's card has a certificate for (GET /v1/models). Left out: 5e-4.",
+}
 
 
 def _blade_that_fits_a_page() -> Blade:

@@ -22,7 +22,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from service.rest.limits import TooLarge, check_blade_size, check_length, check_reach
-from service.rest.question_schemas import BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
+from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
 from training.answers import POLICIES
 
@@ -72,6 +72,10 @@ def _policy(value: Any) -> str:
     return value
 
 
+def _alpha(value: Any) -> float | None:
+    return None if value is None else number("alpha", value, 0.0, 1.0, "", open_low=True)
+
+
 def settings_of(info: ValidationInfo) -> Settings:
     """The service's settings, given to pydantic as context."""
     assert isinstance(info.context, Settings)
@@ -84,7 +88,7 @@ KeArray = Annotated[np.ndarray, PlainValidator(_ke), WithJsonSchema(KE)]
 
 
 class Question(BaseModel, ABC):
-    """What every question holds: a blade, its contact, rotor speeds, and who may answer."""
+    """What every question holds: a blade, its contact, rotor speeds, who may answer, how surely."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
@@ -92,6 +96,7 @@ class Question(BaseModel, ABC):
     contact: Annotated[ContactConfiguration, PlainValidator(_contact), WithJsonSchema(CONTACT)]
     speed_hz: SpeedArray
     policy: Annotated[str, PlainValidator(_policy), WithJsonSchema(POLICY)] = "auto"
+    alpha: Annotated[float | None, PlainValidator(_alpha), WithJsonSchema(ALPHA)] = None
 
     @classmethod
     def read(cls, data: Any, settings: Settings) -> Self:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import zipfile
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import orjson
 
 from sdm_core.errors import DamagedFile
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, CertificateUsed, MapAnswers, PointAnswers
 
 Json = dict[str, Any]
 
@@ -28,7 +29,7 @@ _LABELS = ("source", "reason")
 _MAP_ARRAYS = ("speed_hz", "ke", "stable", "unstable_probability", *_LABELS)
 
 
-def to_json(document: Json) -> bytes:
+def to_json(document: Json | None) -> bytes:
     """JSON in which every NaN, in numpy arrays too, is null."""
     return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -90,13 +91,13 @@ def map_from_dict(reply: Json) -> MapAnswers:
 
 
 def map_to_npz(answers: MapAnswers) -> bytes:
-    """The map as a compressed npz: its arrays, and `model` ('' for none) and `solver` as texts."""
+    """The map as a compressed npz: its arrays, `model` ('' for none), `solver`, and `certificate` as JSON."""
     buffer = io.BytesIO()
     arrays: Json = {name: np.asarray(getattr(answers, name)) for name in _MAP_ARRAYS}
     arrays |= {name: arrays[name].astype(str) for name in _LABELS}
-    np.savez_compressed(
-        buffer, **arrays, model=np.array(answers.model or ""), solver=np.array(answers.solver)
-    )
+    arrays["model"], arrays["solver"] = np.array(answers.model or ""), np.array(answers.solver)
+    arrays["certificate"] = np.array(to_json(_origin(answers)["certificate"]).decode())
+    np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
 
 
@@ -112,9 +113,11 @@ def map_from_npz(content: bytes) -> MapAnswers:
         with np.load(io.BytesIO(content), allow_pickle=False) as npz:
             arrays = {name: npz[name] for name in _MAP_ARRAYS}
             model, solver = str(npz["model"]), str(npz["solver"])
-    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+            said = str(npz["certificate"]) if "certificate" in npz else "null"
+            certificate = _certificate_from(orjson.loads(said))
+    except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise DamagedFile("map", f"{len(content)} bytes", f"ask for it again ({error})") from None
-    return MapAnswers(**arrays, model=model or None, solver=solver)
+    return MapAnswers(**arrays, model=model or None, solver=solver, certificate=certificate)
 
 
 def _truths(stable: np.ndarray) -> list:
@@ -132,12 +135,22 @@ def _origin(answers: PointAnswers | BoundaryAnswers | MapAnswers) -> Json:
         "reason": answers.reason.tolist(),
         "model": answers.model,
         "solver": answers.solver,
+        "certificate": None if answers.certificate is None else asdict(answers.certificate),
     }
 
 
 def _origin_from(reply: Json) -> Json:
     labels = {name: np.array(reply[name], dtype=str) for name in _LABELS}
-    return {**labels, "model": reply["model"], "solver": reply["solver"]}
+    return {
+        **labels,
+        "model": reply["model"],
+        "solver": reply["solver"],
+        "certificate": _certificate_from(reply.get("certificate")),
+    }
+
+
+def _certificate_from(data: Json | None) -> CertificateUsed | None:
+    return None if data is None else CertificateUsed(**data)
 
 
 def _floats(reply: Json, names: tuple[str, ...]) -> Json:

@@ -10,6 +10,17 @@ Source = Literal["surrogate", "exact"]
 Reason = Literal["confident", "near_boundary", "out_of_domain", "requested"]
 
 
+class CertificateReply(BaseModel):
+    """The bound that the surrogate's answers keep."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    alpha: float = Field(description="Bound on the rate of unstable points among those it calls stable.")
+    confidence: float = Field(description="That the bound holds.")
+    distribution: str = Field(description="Of blades, speeds and stiffnesses, on which it holds.")
+    spreads: float = Field(description="Points nearer to the boundary than this many spreads are verified.")
+
+
 class Reply(BaseModel):
     """What every answer says about where it comes from."""
 
@@ -17,6 +28,9 @@ class Reply(BaseModel):
 
     model: str | None = Field(description="The surrogate; null where none is loaded.")
     solver: str = Field(description="The exact method.")
+    certificate: CertificateReply | None = Field(
+        description="null where the surrogate was not asked, or answered unverified."
+    )
 
 
 class PointsReply(Reply):

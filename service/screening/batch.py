@@ -88,6 +88,7 @@ def screen_each(
     ke_liner: float | None = None,
     map_shape: tuple[int, int] | None = None,
     policy: str = "auto",
+    alpha: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[ScreeningReport | None, tuple[tuple[Blade, str], ...], tuple[Failure, ...]]:
     """Screen blades given with their sources, each for itself; further arguments as of `screen`.
@@ -126,6 +127,7 @@ def screen_each(
                     ke_liner=ke_liner,
                     map_shape=map_shape,
                     policy=policy,
+                    alpha=alpha,
                     progress=told,
                 )
             )

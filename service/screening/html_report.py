@@ -17,6 +17,7 @@ from service.screening.html_charts import boundaries_svg, map_svg, overview_svgs
 from service.screening.html_page import Markup, element, page, table
 from service.screening.html_ranking import NOT_SCREENED, count, ranking, set_ke, summary, verdict
 from service.screening.screen import ScreeningResult
+from training.answers import CertificateUsed
 
 _TITLE = "Screening for rub-induced instability"
 # On a sheet; report.json has all that were found.
@@ -52,10 +53,13 @@ def html_report(batch: ScreenedBatch, *, policy: str, card: Mapping[str, Any] | 
     return page(_TITLE, "\n".join((*body, element("p", foot, cls="foot"))))
 
 
-def certificate(card: Mapping[str, Any], policy: str) -> str:
-    """What a model's card says of its mistakes, in a line; a card of another age may say less."""
+def certificate(card: Mapping[str, Any], policy: str, used: CertificateUsed | None = None) -> str:
+    """What a model's card says of its mistakes, in a line, and the bound its answers were given under.
+
+    A card of another age may say less.
+    """
     said = []
-    evaluation, band = card.get("evaluation", {}), card.get("verification_band", {})
+    evaluation = card.get("evaluation", {})
     found = evaluation.get("alone" if policy == "surrogate" else "auto", {})
     if "false_stable" in found:
         said.append(
@@ -64,10 +68,10 @@ def certificate(card: Mapping[str, Any], policy: str) -> str:
             f"{found['false_unstable']} of {found['answered_unstable']:,} “unstable”, "
             f"{found['exact_share']:.1%} being verified by the exact core"
         )
-    if "alpha" in band and policy != "surrogate":
+    if used is not None:
         said.append(
-            f"the share of unstable designs among those called stable is below {band['alpha']:g} "
-            f"with {band['confidence']:.0%} confidence on {band.get('distribution', 'its domain')}"
+            f"the share of unstable designs among those called stable is below {used.alpha:g} "
+            f"with {used.confidence:.0%} confidence on {used.distribution}"
         )
     return "; ".join(said) or "its card names no error rates"
 
@@ -104,7 +108,8 @@ def _screened(batch: ScreenedBatch, policy: str, card: Mapping[str, Any] | None,
         ("maps", _who_answers(policy, batch.report.model)),
     ]
     if batch.report.model is not None:
-        said = certificate(card, policy) if card else "card not known"
+        used = next((row.map.certificate for row in results if row.map.certificate is not None), None)
+        said = certificate(card or {}, policy, used) if card or used else "card not known"
         rows.append(("surrogate", f"{batch.report.model}: {said}"))
     rows.append(("made", f"{_date(made)} by rubscreen {__version__}"))
     marked = [

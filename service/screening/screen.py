@@ -164,6 +164,7 @@ def screen(
     map_shape: tuple[int, int] | None = None,
     policy: str = "auto",
     sweep_policy: str | None = None,
+    alpha: float | None = None,
     progress: Progress | None = None,
 ) -> ScreeningReport:
     """Screen every blade under every contact.
@@ -186,6 +187,8 @@ def screen(
         Of the maps. Lobe tips are exact whatever it is.
     sweep_policy
         Of the sweep over speeds that finds the lobes, and that charts draw; None is `policy`.
+    alpha
+        Rate of unstable designs called stable that "auto" must keep; None is the model's default.
     progress
         Called with (done, total, what is next); may raise to stop the work.
 
@@ -213,9 +216,12 @@ def screen(
         columns, rows = map_shape or (MAP_SHAPE if contact.permanent else MAP_SHAPE_WITH_ARCS)
         speed_hz = evenly_spaced(*speeds, columns)
         sweep = lobe_grid(blade, contact, speed_hz, ke_max)
-        boundary, tips = searched(answerer, blade, contact, sweep, ke_max, sweep_policy or policy)
+        boundary, tips = searched(
+            answerer, blade, contact, sweep, ke_max, sweep_policy or policy, alpha=alpha
+        )
         boundary = through_tips(answerer, blade, contact, boundary, tips)
-        verdicts = answerer.map(blade, contact, speed_hz, np.linspace(0.0, ke_max, rows), policy=policy)
+        ke = np.linspace(0.0, ke_max, rows)
+        verdicts = answerer.map(blade, contact, speed_hz, ke, policy=policy, alpha=alpha)
         shares = verdicts.unstable_share, verdicts.exact_share
         results.append(
             ScreeningResult(blade, name, contact, speeds, tips, ke_max, ke_liner, *shares, boundary, verdicts)

@@ -30,6 +30,7 @@ def searched(
     ke_max: float,
     policy: str,
     progress: Progress | None = None,
+    alpha: float | None = None,
 ) -> tuple[BoundaryAnswers, tuple[CriticalSpeed, ...]]:
     """The boundary on a grid of speeds, and the tips of its deepest lobes by the exact core.
 
@@ -40,8 +41,8 @@ def searched(
     ----------
     grid
         Rising speeds, Hz; `lobe_grid` misses no lobe.
-    policy
-        Of the sweep.
+    policy, alpha
+        Of the sweep: who answers, and the false-stable rate that "auto" keeps (None: the model's default).
 
     Returns
     -------
@@ -56,7 +57,7 @@ def searched(
         count = TIPS if contact.permanent else TIPS_WITH_ARCS
         return deepest_lobe_tips(boundary, exact, blade.first_frequency_hz, ke_max=ke_max, count=count)
 
-    boundary = swept(answerer, blade, contact, grid, reach, policy, progress)
+    boundary = swept(answerer, blade, contact, grid, reach, policy, progress, alpha)
     found = tips(boundary)
     if not found and not (boundary.source == EXACT).all():
         boundary = swept(answerer, blade, contact, grid, reach, "exact", progress)
@@ -72,6 +73,7 @@ def swept(
     ke_max: float,
     policy: str,
     progress: Progress | None = None,
+    alpha: float | None = None,
 ) -> BoundaryAnswers:
     """First crossing at each speed; with arcs of contact asked for in parts.
 
@@ -86,7 +88,7 @@ def swept(
         if progress is not None:
             progress(start, len(speed_hz), f"{speed_hz[start]:.4g} Hz")
         part = speed_hz[start : start + size]
-        parts.append(answerer.boundary(blade, contact, part, ke_max, policy=policy))
+        parts.append(answerer.boundary(blade, contact, part, ke_max, policy=policy, alpha=alpha))
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
@@ -144,4 +146,5 @@ def _joined(parts: Sequence[BoundaryAnswers]) -> BoundaryAnswers:
         reason=column("reason"),
         model=parts[0].model,
         solver=parts[0].solver,
+        certificate=next((part.certificate for part in parts if part.certificate is not None), None),
     )

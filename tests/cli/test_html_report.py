@@ -23,6 +23,7 @@ from service.screening.html_charts import map_svg, overview_svgs
 from service.screening.html_png import indexed_png
 from service.screening.html_report import certificate, html_report
 from service.screening.screen import screen
+from training.answers import CertificateUsed
 
 HOSTILE = '<script>alert("1")</script>&amp;<img src=x onerror=alert(1)>'
 MADE = datetime(2026, 3, 1, 12, 30, tzinfo=UTC)
@@ -214,9 +215,8 @@ def test_the_certificate_says_what_the_card_says():
     alone = {**figures, "false_stable": 77, "exact_share": 0.0}
     card = {
         "evaluation": {"auto": figures, "alone": alone, "distribution": "reference/1"},
-        "verification_band": {"alpha": 5e-4, "confidence": 0.95},
     }
-    said = certificate(card, "auto")
+    said = certificate(card, "auto", CertificateUsed(5e-4, 0.95, "reference/1", 10.0))
     for part in ("20,000", "3 of 9,949", "5 of 9,780", "1.4%", "0.0005", "95%", "reference/1"):
         assert part in said
     assert "77 of 9,949" in certificate(card, "surrogate")

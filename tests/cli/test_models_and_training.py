@@ -7,8 +7,8 @@ import shutil
 
 import pytest
 
-from training import pipeline, registry
-from training.calibration import CalibrationFailed
+from training import calibration, pipeline, registry
+from training.certificate import CalibrationFailed
 
 ROTOR = "nasa_rotor_37"
 
@@ -55,6 +55,34 @@ def test_the_exact_core_answers_without_any_model(rubscreen, tmp_path):
     result = rubscreen("map", ROTOR, *options)
     assert result.exit_code == 0, result.output
     assert "100.0% answered by the exact core" in result.stdout
+
+
+def test_maps_are_answered_at_the_rate_asked_for(rubscreen):
+    asked = ["map", ROTOR, "--grid", "20x20"]
+    result = rubscreen(*asked, "--alpha", "1e-4", "--json", "-")
+    assert result.exit_code == 0, result.output
+    certificate = json.loads(result.stdout)["certificate"]
+    assert (certificate["alpha"], certificate["distribution"]) == (1e-4, "reference/1")
+    assert "false stable below 0.0001 on reference/1 with 95% confidence" in " ".join(result.stderr.split())
+    refused = rubscreen(*asked, "--alpha", "0.3")
+    assert refused.exit_code == 2
+    assert refused.stderr.startswith("rubscreen: alpha = 0.3: ") and "0.0001" in refused.stderr
+
+
+def test_recalibrating_shows_every_rate_and_writes_another_model(rubscreen, own_models, monkeypatch):
+    model = registry.load_model()
+
+    def as_it_says(cases, *, workers, progress=None):
+        return 10.0 ** model.surrogate.boundary(cases).log_ke / cases.stiffness_scale
+
+    monkeypatch.setattr(calibration, "critical_kappa", as_it_says)
+    asked = ["models", "recalibrate", model.id, "--models", str(own_models), "--evaluation-points", "1000"]
+    result = rubscreen(*asked, "--points", "20000")
+    assert result.exit_code == 0, result.output
+    assert registry.active_id(own_models) != model.id
+    assert registry.active_id(own_models) in result.stdout
+    for text in ("20,000 points of reference/1, permanent contact", "0.0005", "not reached"):
+        assert text in " ".join(result.stdout.split())
 
 
 def test_training_that_fails_its_calibration_ends_with_exit_code_1(rubscreen, tmp_path, monkeypatch):

@@ -21,9 +21,10 @@ from sdm_core.errors import InvalidInput
 from service.app import create_app
 from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
 from service.settings import Settings
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, CertificateUsed, MapAnswers, PointAnswers
 
 EXAMPLES = {"/v1/stability": POINTS_EXAMPLE, "/v1/boundary": BOUNDARY_EXAMPLE, "/v1/map": MAP_EXAMPLE}
+CERTIFICATE = CertificateUsed(1e-3, 0.95, "rules/1", 12.0)
 
 
 @dataclass
@@ -40,12 +41,14 @@ class RuleScreener:
     def __post_init__(self) -> None:
         self.pause.set()
 
-    def _origin(self, ke: np.ndarray, policy: str) -> dict[str, Any]:
+    def _origin(self, ke: np.ndarray, policy: str, alpha: float | None) -> dict[str, Any]:
         self.entered.set()
         assert self.pause.wait(20.0)
         outside = ke > self.domain_ends
         if policy == "surrogate" and outside.any():
             raise InvalidInput("ke", float(ke[outside].flat[0]), 'outside the domain: use policy "auto"')
+        if alpha not in (None, 1e-3):
+            raise InvalidInput("alpha", alpha, "the model is certified for 0.001")
         exact = outside | (policy == "exact")
         reason = np.where(outside, "out_of_domain", "confident")
         return {
@@ -53,13 +56,14 @@ class RuleScreener:
             "reason": np.where(np.full(ke.shape, policy == "auto"), reason, "requested"),
             "model": self.model_id,
             "solver": "rule",
+            "certificate": CERTIFICATE if policy == "auto" else None,
         }
 
     def _verdict(self, ke: np.ndarray) -> np.ndarray:
         return np.where(ke == self.critical, np.nan, np.where(ke < self.critical, 1.0, 0.0))
 
     def points(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> PointAnswers:
-        origin = self._origin(ke, policy)
+        origin = self._origin(ke, policy, alpha)
         exact = origin["source"] == "exact"
         radius = np.where(exact, ke / self.critical, np.nan)
         return PointAnswers(
@@ -77,7 +81,7 @@ class RuleScreener:
         )
 
     def boundary(self, blade, contact, speed_hz, ke_max, policy="auto", alpha=None) -> BoundaryAnswers:
-        origin = self._origin(np.full(speed_hz.shape, ke_max), policy)
+        origin = self._origin(np.full(speed_hz.shape, ke_max), policy, alpha)
         found = ke_max > self.critical
         intervals = (((self.critical, ke_max),) if found else ()) if origin["source"][0] == "exact" else None
         return BoundaryAnswers(
@@ -92,7 +96,7 @@ class RuleScreener:
 
     def map(self, blade, contact, speed_hz, ke, policy="auto", alpha=None) -> MapAnswers:
         grid = np.repeat(ke[:, None], len(speed_hz), axis=1)
-        origin = self._origin(grid, policy)
+        origin = self._origin(grid, policy, alpha)
         probability = np.where(origin["source"] == "exact", np.nan, 0.25)
         return MapAnswers(speed_hz, ke, self._verdict(grid), probability, **origin)
 

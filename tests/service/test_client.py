@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import pickle
 from collections.abc import Iterator
 from dataclasses import fields
@@ -49,6 +50,25 @@ def test_the_client_answers_what_the_screener_answers(client, screener, policy):
     for ke_max in (1e3, 1e5):
         asked = (BLADE, CONTACT, SPEEDS, ke_max, policy)
         _same(far.boundary(*asked), near.boundary(*asked))
+
+
+def test_the_client_asks_for_a_rate_and_is_told_what_was_used(client, screener):
+    for far, near in ((client.points, screener.points), (client.map, screener.map)):
+        found = far(BLADE, CONTACT, SPEEDS, KE, alpha=1e-3)
+        _same(found, near(BLADE, CONTACT, SPEEDS, KE, alpha=1e-3))
+        assert found.certificate.distribution == "rules/1"
+        with pytest.raises(ServiceProblem, match="alpha"):
+            far(BLADE, CONTACT, SPEEDS, KE, alpha=2e-3)
+    assert client.boundary(BLADE, CONTACT, SPEEDS, 1e5, alpha=1e-3).certificate.spreads == 12.0
+
+
+def test_a_map_of_a_service_that_knows_no_certificates_is_still_read(screener):
+    near = screener.map(BLADE, CONTACT, SPEEDS, KE)
+    with np.load(io.BytesIO(replies.map_to_npz(near)), allow_pickle=False) as npz:
+        older = {name: npz[name] for name in npz.files if name != "certificate"}
+    buffer = io.BytesIO()
+    np.savez(buffer, **older)
+    assert replies.map_from_npz(buffer.getvalue()).certificate is None
 
 
 def test_stability_is_the_clients_other_name_for_points(client):

@@ -21,7 +21,8 @@ from service.app import create_app
 from service.client import Client
 from service.rest.question_schemas import POINTS_EXAMPLE
 from service.settings import Settings
-from training.calibration import VerificationBand
+from training.certificate import BANDS, Certificate, CertifiedBand
+from training.contact_class import PERMANENT
 from training.design_space import DesignSpace
 from training.registry import write_model
 from training.screening import Screener
@@ -37,10 +38,9 @@ def untrained(folder: Path) -> str:
     torch.manual_seed(0)
     architecture = Architecture(width=8, blocks=1)
     surrogate = Surrogate(BoundaryNetwork(architecture), architecture)
-    band = VerificationBand(
-        spreads=1e6, alpha=1.0, confidence=0.5, accepted=0, errors=0, distribution="none: untrained"
-    )
-    return write_model(surrogate, DesignSpace(), band, {"trained_on": "nothing"}, folder).id
+    lines = tuple(CertifiedBand(alpha, 1e6, 0, 0, 1.0, 0.0) for alpha in (1e-2, 5e-4))
+    certificate = Certificate("none: untrained", PERMANENT, 0.5, 0, 0, lines, BANDS)
+    return write_model(surrogate, DesignSpace(), [certificate], {"trained_on": "nothing"}, folder).id
 
 
 @pytest.fixture(scope="module")

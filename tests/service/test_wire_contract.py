@@ -78,6 +78,18 @@ def test_a_map_with_nothing_decided_has_no_unstable_share(http, question):
     assert http.post("/v1/map", json=question("/v1/map", ke=[1e4])).json()["unstable_share"] is None
 
 
+@pytest.mark.parametrize("path", REPLIES)
+def test_an_answer_says_under_which_certificate_it_was_given(http, question, problem, path):
+    said = {"alpha": 1e-3, "confidence": 0.95, "distribution": "rules/1", "spreads": 12.0}
+    for alpha in (None, 1e-3):
+        assert http.post(path, json=question(path, alpha=alpha)).json()["certificate"] == said
+    assert http.post(path, json=question(path, policy="exact")).json()["certificate"] is None
+    refused = problem(http.post(path, json=question(path, alpha=2e-3)), 422, "alpha")
+    assert refused["value"] == "0.002" and "0.001" in refused["remedy"]
+    for alpha in (0, -1, 1.5, "1e-3", True, [1e-3]):
+        problem(http.post(path, json=question(path, alpha=alpha)), 422, "alpha")
+
+
 @pytest.mark.parametrize("form", ["application/x-npz", "application/octet-stream"])
 def test_a_map_as_npz_holds_the_same_and_needs_no_pickle(http, question, form):
     body = question("/v1/map", ke=[1e3, 1e4, 2e6])

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 from sdm_core.errors import DamagedFile, InvalidInput
-from training.calibration import VerificationBand
 from training.cases import CaseBatch
+from training.certificate import Certificate, CertifiedBand
+from training.contact_class import ARCS, PERMANENT
 from training.dataset import Dataset
 from training.design_space import DesignSpace
 from training.registry import active_id, list_models, load_model, write_model
 from training.surrogate import Architecture, BoundaryNetwork, Surrogate
 
-BAND = VerificationBand(9.0, 5e-4, 0.95, 10_000, 0, "synthetic")
+LINE = CertifiedBand(5e-4, 9.0, 10_000, 0, 0.02, 1e-4)
+CERTIFICATES = [
+    Certificate("synthetic", PERMANENT, 0.95, 20_000, 1, (LINE,), (80.0, 9.0), (1e-4,)),
+    Certificate("elsewhere", PERMANENT, 0.9, 30_000, 2, (), (80.0, 9.0), (5e-4,)),
+    Certificate("synthetic", ARCS, 0.95, 20_000, 3, (), (80.0,), ()),
+]
 
 
 @pytest.fixture
@@ -26,7 +32,7 @@ def dataset():
 def models(tmp_path):
     architecture = Architecture(width=8, blocks=1)
     surrogate = Surrogate(BoundaryNetwork(architecture), architecture)
-    model = write_model(surrogate, DesignSpace(), BAND, {"seed": 1}, tmp_path)
+    model = write_model(surrogate, DesignSpace(), CERTIFICATES, {"seed": 1}, tmp_path)
     return tmp_path, model
 
 
@@ -65,15 +71,15 @@ def test_a_model_reads_back_with_the_same_answers(models):
     cases = DesignSpace().sample(3, 2, seed=2)
     ours, theirs = model.surrogate.boundary(cases), again.surrogate.boundary(cases)
     np.testing.assert_array_equal(ours.log_ke, theirs.log_ke)
-    assert again.band == BAND
+    assert list(again.certificates) == CERTIFICATES
     assert again.design_space == DesignSpace()
     assert [(e.id, e.active) for e in list_models(folder)] == [(model.id, True)]
 
 
 def test_writing_the_same_model_twice_gives_one_model(models):
     folder, model = models
-    same = write_model(model.surrogate, DesignSpace(), BAND, {"seed": 1}, folder)
-    other = write_model(model.surrogate, DesignSpace(), BAND, {"seed": 2}, folder, activate=False)
+    same = write_model(model.surrogate, DesignSpace(), CERTIFICATES, {"seed": 1}, folder)
+    other = write_model(model.surrogate, DesignSpace(), CERTIFICATES, {"seed": 2}, folder, activate=False)
     assert same.id == model.id != other.id
     assert active_id(folder) == model.id
     assert len(list_models(folder)) == 2
@@ -97,7 +103,7 @@ def test_a_card_cut_short_or_of_another_code_is_refused(models):
         load_model(folder=folder)
     (entry,) = list_models(folder)
     assert entry.active and "card.json" in entry.damage
-    for change in ({"features": ["other"]}, {"verification_band": {**BAND.to_dict(), "spreads": 0.0}}):
+    for change in ({"features": ["other"]}, {"certificates": []}):
         path.write_text(json.dumps({**json.loads(text), **change}, indent=1, sort_keys=True) + "\n")
         with pytest.raises(DamagedFile, match="not the one written"):
             load_model(folder=folder)

@@ -1,5 +1,7 @@
 """Surrogate or exact: the policy, on the shipped model and real blades."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,17 @@ from sdm_core.boundary import boundary, verdicts
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput, OutOfSpeedRange, TooMuchWork
 from sdm_core.fourier_engagement import FourierEngagement
-from training.answers import CONFIDENT, EXACT, NEAR_BOUNDARY, OUT_OF_DOMAIN, REQUESTED, SURROGATE
+from training.answers import (
+    CONFIDENT,
+    EXACT,
+    NEAR_BOUNDARY,
+    OUT_OF_DOMAIN,
+    REQUESTED,
+    SURROGATE,
+    CertificateUsed,
+)
 from training.cases import CaseBatch
+from training.contact_class import PERMANENT
 from training.evaluation import evaluate
 from training.features import MODE_FEATURES, PHASE_FEATURES, features
 from training.labelling import critical_kappa
@@ -43,7 +54,7 @@ def test_the_shipped_model_keeps_its_promises_on_points_it_never_saw(screener, u
     model = screener.model
     found = evaluate(
         model.surrogate.boundary(sample.cases),
-        model.band,
+        model.certificate(PERMANENT).line().band,
         model.design_space.contains(sample.cases),
         sample.ke,
         critical,
@@ -170,3 +181,51 @@ def test_a_blade_whose_contact_node_never_moves_is_stable_without_a_crossing(scr
     found = screener.boundary(still, contact, np.array([30.0]), 1e6)
     assert np.isnan(found.critical_ke[0]) and found.unstable_ke[0] == ()
     assert screener.points(still, contact, np.array([30.0]), np.array([1e6])).stable[0] == 1.0
+
+
+def with_bands(screener, **spreads):
+    """The same model with one line for each alpha, of chosen bands."""
+    (certificate,) = screener.model.certificates
+    lines = tuple(replace(certificate.table[0], alpha=float(a), spreads=s) for a, s in spreads.items())
+    return Screener(replace(screener.model, certificates=(replace(certificate, table=lines),)))
+
+
+def test_a_stricter_rate_never_verifies_less_and_says_under_what_it_answered(screener, rotor_37):
+    speed, ke = np.linspace(60.0, 300.0, 40), np.linspace(0.0, 2.5e4, 40)
+    banded = with_bands(screener, **{"1e-2": 2.0, "5e-4": 40.0, "1e-4": 80.0})
+    loose, usual, strict = (banded.map(rotor_37, LE, speed, ke, alpha=a) for a in (1e-2, None, 1e-4))
+    assert loose.exact_share < usual.exact_share < strict.exact_share
+    for less, more in ((loose, usual), (usual, strict)):
+        assert (more.source[less.source == EXACT] == EXACT).all()
+    assert loose.certificate == CertificateUsed(1e-2, 0.95, NAME, 2.0)
+    assert usual.certificate == CertificateUsed(5e-4, 0.95, NAME, 40.0)
+    few, many = (banded.points(rotor_37, LE, speed, np.full(40, 1e4), alpha=a) for a in (1e-2, 1e-4))
+    assert few.exact_share < many.exact_share
+    assert many.certificate == strict.certificate
+    sure, unsure = (banded.boundary(rotor_37, LE, speed, 2.5e4, alpha=a) for a in (1e-2, 1e-4))
+    assert sure.exact_share < unsure.exact_share
+    assert unsure.certificate == strict.certificate
+
+
+def test_every_certified_rate_can_be_asked_for_and_no_other(screener, rotor_37):
+    asked = (rotor_37, LE, np.array([250.0]), np.array([1e3]))
+    for alpha in (1e-2, 5e-3, 1e-3, 5e-4, 1e-4):
+        assert screener.map(*asked, alpha=alpha).certificate.alpha == alpha
+    for ask in (screener.points, screener.map):
+        with pytest.raises(InvalidInput, match=r"alpha = 0\.002: .*0\.01, 0\.005, 0\.001, 0\.0005, 0\.0001"):
+            ask(*asked, alpha=2e-3)
+    with pytest.raises(InvalidInput, match="alpha = 1e-05"):
+        screener.boundary(rotor_37, LE, np.array([250.0]), 1e4, alpha=1e-5)
+    for alpha in (0.0, -1e-3, 2.0, np.nan, True, "1e-3"):
+        with pytest.raises(InvalidInput, match="alpha"):
+            screener.map(*asked, alpha=alpha)
+
+
+def test_without_the_surrogate_or_without_verification_there_is_no_certificate(screener, rotor_37):
+    speed, ke = np.array([250.0]), np.array([1e3])
+    assert screener.map(rotor_37, LE, speed, ke, "exact", alpha=1e-3).certificate is None
+    assert screener.points(rotor_37, ARCS, speed, ke, alpha=1e-3).certificate is None
+    assert screener.boundary(rotor_37, LE, np.array([20.0]), 1e4).certificate is None  # out of domain
+    assert screener.map(rotor_37, LE, speed, ke, "surrogate").certificate is None
+    with pytest.raises(InvalidInput, match="the surrogate alone keeps no rate"):
+        screener.map(rotor_37, LE, speed, ke, "surrogate", alpha=1e-3)

@@ -37,7 +37,7 @@ async def is_it_stable(request: Request, body: TheBody) -> Response:
     def answer() -> bytes:
         ask = PointsQuestion.read(parsed(body), desk.settings)
         answerer = desk.answerer(ask.policy)
-        found = answerer.points(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy)
+        found = answerer.points(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy, ask.alpha)
         return replies.to_json(replies.points_to_dict(found))
 
     return Response(await desk.work.run(answer, request), media_type=JSON)
@@ -56,7 +56,7 @@ async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
     def answer() -> bytes:
         ask = BoundaryQuestion.read(parsed(body), desk.settings)
         answerer = desk.answerer(ask.policy)
-        found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy)
+        found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy, ask.alpha)
         return replies.to_json(replies.boundary_to_dict(found))
 
     return Response(await desk.work.run(answer, request), media_type=JSON)
@@ -84,7 +84,7 @@ async def map_of_stability(request: Request, body: TheBody) -> Response:
         if form == PNG:
             ask.check_chartable()
         answerer = desk.answerer(ask.policy)
-        found = answerer.map(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy)
+        found = answerer.map(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy, ask.alpha)
         if form == JSON:
             return replies.to_json(replies.map_to_dict(found))
         if form == PNG:
@@ -101,5 +101,5 @@ def _chart(answerer: Answerer, ask: MapQuestion, found: MapAnswers) -> bytes:
     boundary = None
     if ask.contact.permanent:  # with arcs a boundary costs more than the map
         ke_max = float(ask.ke[-1])
-        boundary = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ke_max, ask.policy)
+        boundary = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ke_max, ask.policy, ask.alpha)
     return map_png(ask.blade, ask.contact, found, boundary)

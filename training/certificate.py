@@ -1,0 +1,184 @@
+"""The certificate: a bound on the rate of unstable designs called stable, proven on independent points."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from sdm_core.errors import InvalidInput, RubscreenError
+from training.learn_then_test import simultaneous_sequences
+from training.surrogate import PredictedBoundary
+from training.verification_band import VerificationBand
+
+# The rates a user may ask for, loosest first, and the candidate bands in spreads, safest first. Both are
+# set before any data is seen: they are the order of the tests. The bands end at ten, though fewer may do:
+# real blades are drawn from no distribution, and in permanent contact verifying a few more costs little.
+LADDER = (1e-2, 5e-3, 1e-3, 5e-4, 1e-4)
+BANDS = (80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0)
+CONFIDENCE = 0.95
+# A model that does not reach this one is not worth serving.
+DEFAULT_ALPHA = 5e-4
+
+
+class CalibrationFailed(RubscreenError):
+    """No band keeps the bound: too few points, or too poor a surrogate."""
+
+
+@dataclass(frozen=True)
+class CertifiedBand:
+    """A line of the table: the narrowest band that keeps a rate.
+
+    Attributes
+    ----------
+    alpha
+        Bound on P(unstable | answered stable, not verified).
+    spreads
+        Half width of the verification band in learned spreads.
+    accepted, errors
+        Calibration points answered stable without verification, and how many of them were unstable.
+    verified_share
+        Share of the calibration points that the exact core would have answered.
+    false_unstable_rate
+        Share of stable ones among the calibration points answered unstable without verification. Observed,
+        not certified: such a mistake costs a design, not a blade.
+    """
+
+    alpha: float
+    spreads: float
+    accepted: int
+    errors: int
+    verified_share: float
+    false_unstable_rate: float
+
+    @property
+    def band(self) -> VerificationBand:
+        """What must be verified."""
+        return VerificationBand(self.spreads)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What is proven of a surrogate on one named distribution in one class of contact.
+
+    With `confidence` over the draw of the calibration points, **every** line of the table is true at
+    once: a rate may be chosen after looking at the shares. Another certificate is another statement
+    with a confidence of its own.
+
+    Attributes
+    ----------
+    distribution
+        Name of the distribution of the calibration points.
+    contact
+        Class of contact (`training.contact_class`).
+    confidence
+        Of the whole table.
+    points, seed
+        How many calibration points, and what they were drawn with.
+    table
+        Lines by alpha, loosest first.
+    candidates
+        Bands that were tested, in spreads, in their order.
+    not_reached
+        Rates asked for that no band was proven to keep.
+    """
+
+    distribution: str
+    contact: str
+    confidence: float
+    points: int
+    seed: int
+    table: tuple[CertifiedBand, ...]
+    candidates: tuple[float, ...]
+    not_reached: tuple[float, ...] = ()
+
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """Rates there is a line for, loosest first."""
+        return tuple(line.alpha for line in self.table)
+
+    def line(self, alpha: float | None = None) -> CertifiedBand:
+        """The line of a rate; None is `DEFAULT_ALPHA`.
+
+        Raises
+        ------
+        InvalidInput
+            When there is none, naming those there are.
+        """
+        asked = DEFAULT_ALPHA if alpha is None else alpha
+        for line in self.table:
+            if np.isclose(line.alpha, asked, rtol=1e-9, atol=0.0):
+                return line
+        known = ", ".join(f"{a:g}" for a in self.alphas) or "none"
+        raise InvalidInput("alpha", asked, f"the model is certified for {known} on {self.distribution}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the model card."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Certificate:
+        """From the model card."""
+        lists = {"candidates": tuple(data["candidates"]), "not_reached": tuple(data["not_reached"])}
+        return cls(**{**data, **lists, "table": tuple(CertifiedBand(**line) for line in data["table"])})
+
+
+def certify(
+    boundary: PredictedBoundary,
+    inside: np.ndarray,
+    ke: np.ndarray,
+    unstable: np.ndarray,
+    *,
+    distribution: str,
+    contact: str,
+    seed: int,
+    bands: tuple[float, ...] = BANDS,
+    alphas: tuple[float, ...] = LADDER,
+    confidence: float = CONFIDENCE,
+) -> Certificate:
+    """For each rate the narrowest band proven to keep it, all of them together with `confidence`.
+
+    Parameters
+    ----------
+    boundary
+        The surrogate's at the calibration points: an independent sample of the distribution, of which
+        neither training nor the choice of the model has seen anything.
+    inside
+        Which points lie in the design space; the others are verified whatever the band.
+    ke, unstable
+        K_e in N/m and the exact verdict, shape (m,) each.
+    bands, alphas
+        Candidates in spreads and rates, both falling.
+    """
+    says_stable = boundary.score(ke) < 0
+    lines = [_counted(VerificationBand(s), boundary, inside, ke, unstable, says_stable) for s in bands]
+    errors, accepted = [line.errors for line in lines], [line.accepted for line in lines]
+    counts = simultaneous_sequences(errors, accepted, alphas, confidence)
+    table = tuple(
+        CertifiedBand(alpha, **{k: v for k, v in asdict(lines[held - 1]).items() if k != "alpha"})
+        for alpha, held in zip(alphas, counts, strict=True)
+        if held
+    )
+    missed = tuple(alpha for alpha, held in zip(alphas, counts, strict=True) if not held)
+    return Certificate(distribution, contact, confidence, len(ke), seed, table, bands, missed)
+
+
+def _counted(
+    band: VerificationBand,
+    boundary: PredictedBoundary,
+    inside: np.ndarray,
+    ke: np.ndarray,
+    unstable: np.ndarray,
+    says_stable: np.ndarray,
+) -> CertifiedBand:
+    verified = band.verify(boundary, ke) | ~inside
+    stable, risky = ~verified & says_stable, ~verified & ~says_stable
+    return CertifiedBand(
+        np.nan,
+        band.spreads,
+        int(stable.sum()),
+        int((stable & unstable).sum()),
+        float(verified.mean()),
+        float((risky & ~unstable).sum() / max(1, risky.sum())),
+    )

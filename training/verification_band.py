@@ -1,0 +1,35 @@
+"""How near the boundary the surrogate must not be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from training.surrogate import PredictedBoundary
+
+# A verdict within 5 % of the boundary is verified however sure the surrogate is.
+LEAST_HALF_WIDTH = float(np.log10(1.05))
+
+
+@dataclass(frozen=True)
+class VerificationBand:
+    """Points nearer to the boundary than this go to the exact core.
+
+    Attributes
+    ----------
+    spreads
+        Half width of the band in learned spreads; in K_e it is 5 % at least.
+    """
+
+    spreads: float
+
+    def verify(self, boundary: PredictedBoundary, ke: np.ndarray) -> np.ndarray:
+        """Which points must be verified, shape (m,)."""
+        with np.errstate(divide="ignore"):
+            distance = np.abs(np.log10(ke) - boundary.log_ke)
+        return ~(distance > self.half_width(boundary))
+
+    def half_width(self, boundary: PredictedBoundary) -> np.ndarray:
+        """Half width of the band in log10 K_e, shape (m,)."""
+        return np.maximum(self.spreads * boundary.spread, LEAST_HALF_WIDTH)
