@@ -65,7 +65,14 @@ def run(
     from sdm_core.assessment import assess
     from sdm_core.validation import number
     from service.commands.assess_tables import edges_table, modes_table, said_of
-    from service.commands.inputs import blade_from, check_work, contact_from, operating_points, speeds_from
+    from service.commands.inputs import (
+        CHORD,
+        blade_from,
+        check_work,
+        contact_from,
+        operating_points,
+        speeds_from,
+    )
     from service.commands.outputs import (
         check_writable,
         console_beside,
@@ -103,6 +110,10 @@ def run(
         console.print(beside)
     for line in said_of(found):
         console.print(line, highlight=False)
+    if weights == CHORD:
+        from sdm_core.contact_weights import chord_weights
+
+        console.print(chord_weights(chosen).described(ke_liner or found.ke_max), highlight=False)
     if json:
         write_json(json, found.to_dict(), indent=True)
     if out is not None and report is not None:
