@@ -12,12 +12,12 @@ import numpy as np
 
 from sdm_core.blade.modal import Blade, ModalState
 from sdm_core.blade.tracking import FURTHER_SHAPES
-from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.errors import InvalidInput
+from sdm_core.json_file import read_json
 from sdm_core.whole_files import staged
 
 SCHEMA = "rubscreen/blade/1"
 EXAMPLES = ("nasa_rotor_37", "generic_compressor_blade")
-LARGEST_FILE_BYTES = 64 * 2**20
 
 _REQUIRED = ("name", "tip_nodes", "damping_ratio", "states")
 _OPTIONAL = (
@@ -101,20 +101,7 @@ def read_blade(path: str | Path) -> Blade:
         When it is not whole JSON.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise InvalidInput("blade file", str(path), "give a file under 64 MiB")
-        text = path.read_text(encoding="utf-8-sig")  # Windows editors put a mark first
-    except OSError as error:
-        raise InvalidInput("blade file", str(path), f"give a readable file ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise DamagedFile("blade file", str(path), "it is not UTF-8 text; give a JSON blade file") from None
-    try:
-        data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise DamagedFile(
-            "blade file", str(path), f"it is not whole JSON ({error}); export it again"
-        ) from None
+    data = read_json(path, "blade file")
     try:
         return blade_from_dict(data)
     except InvalidInput as error:

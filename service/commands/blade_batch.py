@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sdm_core.blade import EXAMPLES, Blade
-from sdm_core.blade.blade_file import LARGEST_FILE_BYTES
 from sdm_core.blade.build_batch import build_each
 from sdm_core.blade.profile import SCHEMA as PROFILE_SCHEMA
 from sdm_core.blade.profile import BladeProfile, read_profile
 from sdm_core.errors import InvalidInput, RubscreenError
+from sdm_core.json_file import read_json
 from service.commands.inputs import blade_from
 from service.screening.batch import Failure
 
@@ -138,12 +137,10 @@ def load_blades(paths: BladePaths, progress: Progress = lambda *_: None) -> Load
 
 
 def schema_of(path: Path) -> str | None:
-    """The ``schema`` a JSON file names; None where there is none to be read, which the loader will say."""
+    """The ``schema`` a JSON file names; None where there is none to be read, which the reader will say."""
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            return None
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError):
+        data = read_json(path, "file")
+    except InvalidInput:
         return None
     schema = data.get("schema") if isinstance(data, dict) else None
     return schema if isinstance(schema, str) else None

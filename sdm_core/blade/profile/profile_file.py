@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -16,10 +15,10 @@ from sdm_core.blade.profile.parametric import ParametricBlade
 from sdm_core.blade.profile.sections import SectionTable, read_sections
 from sdm_core.blade.solid_mesh import Subdivision
 from sdm_core.blade.tip_contact import TipContact
-from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.errors import InvalidInput
+from sdm_core.json_file import read_json
 
 SCHEMA = "rubscreen/profile/1"
-LARGEST_FILE_BYTES = 64 * 2**20
 STACKINGS = ("given", "centroids")
 MOST_SECTIONS, MOST_POINTS = 200, 5000
 
@@ -125,14 +124,7 @@ def read_profile(path: str | Path) -> BladeProfile:
         When it is not whole JSON.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise InvalidInput("profile file", str(path), "give a file under 64 MiB")
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InvalidInput("profile file", str(path), f"give a readable file ({error.strerror})") from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise DamagedFile("profile file", str(path), f"it is not whole JSON ({error})") from None
+    data = read_json(path, "profile file")
     try:
         return profile_from_dict(data, path.parent)
     except InvalidInput as error:
