@@ -69,7 +69,9 @@ def imported(files: Sequence[str], choices: ImportChoices, *, blade_wanted: bool
         try:
             return _from_modal(files, choices)
         except InvalidInput:
-            pass  # it holds matrices, or nothing: what is wrong with them is said below
+            # Modal data need no tip nodes: without them, what is wrong with the modal data is the answer.
+            if blade_wanted and choices.tip is None and not _holds_matrices(files, choices):
+                raise
     nodes = _numbers("--tip", choices.tip, int) if choices.tip else []
     read = read_matrix_model(
         list(files),
@@ -113,6 +115,14 @@ def is_modal(files: Sequence[str], choices: ImportChoices) -> bool:
         with first.open("rb") as file:
             return _MODAL_COLUMN.encode() in file.read(65_536)
     return False
+
+
+def _holds_matrices(files: Sequence[str], choices: ImportChoices) -> bool:
+    try:
+        read_matrix_model(list(files), format=choices.format, units=choices.units)
+    except InvalidInput:
+        return False
+    return True
 
 
 def _from_modal(files: Sequence[str], choices: ImportChoices) -> Imported:

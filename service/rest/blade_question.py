@@ -8,7 +8,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     PlainValidator,
-    ValidationError,
     ValidationInfo,
     WithJsonSchema,
     model_validator,
@@ -20,7 +19,7 @@ from sdm_core.errors import InvalidInput
 from service.rest.limits import TooLarge, check_length
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE
-from service.rest.questions import first_fault, settings_of, the_blade
+from service.rest.questions import read_question, settings_of, the_blade
 from service.settings import Settings
 
 
@@ -66,12 +65,7 @@ class BladeQuestion(BaseModel):
         """
         if isinstance(data, dict) and data.get("schema") == SCHEMA:
             raise InvalidInput("body", "a bare profile", 'wrap it: {"profile": ...}')
-        if not isinstance(data, dict):
-            raise InvalidInput("body", data, f"send a JSON object with {', '.join(cls.model_fields)}")
-        try:
-            return cls.model_validate(data, context=settings)
-        except ValidationError as error:
-            raise first_fault(error, list(cls.model_fields)) from None
+        return read_question(cls, data, settings)
 
     @model_validator(mode="after")
     def _one_of_the_two(self) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -25,6 +25,8 @@ from service.rest.limits import TooLarge, check_blade_size, check_length, check_
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
 from training.answers import POLICIES
+
+Asked = TypeVar("Asked", bound=BaseModel)
 
 
 def the_blade(value: Any, info: ValidationInfo) -> Blade:
@@ -109,12 +111,7 @@ class Question(BaseModel, ABC):
         TooLarge
             When a list is over the limits of `settings`.
         """
-        if not isinstance(data, dict):
-            raise InvalidInput("body", data, f"send a JSON object with {', '.join(cls.model_fields)}")
-        try:
-            return cls.model_validate(data, context=settings)
-        except ValidationError as error:
-            raise first_fault(error, list(cls.model_fields)) from None
+        return read_question(cls, data, settings)
 
     @model_validator(mode="after")
     def _the_core_can_reach_it(self, info: ValidationInfo) -> Self:
@@ -177,7 +174,23 @@ class MapQuestion(KeQuestion):
                 raise InvalidInput(field, values.tolist(), remedy)
 
 
-def first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
+def read_question(kind: type[Asked], data: Any, settings: Settings) -> Asked:
+    """A parsed body as a question of this kind; the first field that cannot be used is named.
+
+    Raises
+    ------
+    InvalidInput, TooLarge
+        As the core would have said it.
+    """
+    if not isinstance(data, dict):
+        raise InvalidInput("body", data, f"send a JSON object with {', '.join(kind.model_fields)}")
+    try:
+        return kind.model_validate(data, context=settings)
+    except ValidationError as error:
+        raise _first_fault(error, list(kind.model_fields)) from None
+
+
+def _first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
     """The first of pydantic's findings as the core would have said it."""
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")

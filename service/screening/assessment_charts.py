@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,21 +21,14 @@ from sdm_core.assessment.robust import RobustVerdict
 from sdm_core.assessment.robust_band import RobustBand
 from sdm_core.boundary import BoundarySolution
 from sdm_core.errors import InvalidInput
-from service.screening.charts import DPI, described
+from service.screening.charts import described
+from service.screening.print_sheet import DPI, LINER, SIZE, STYLES, as_png, legend_below, scaled_by
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SIZE = (7.2, 4.9)
-# As in `charts`: told apart by dash and by lightness, so that a photocopy still shows which is which.
-_STYLES: tuple[tuple[str, Any], ...] = (
-    ("#000000", "-"),
-    ("#c8501e", (0, (5, 1.6))),
-    ("#2a6fbb", (0, (1.2, 1.2))),
-    ("#5a5a5a", "-."),
-    ("#7a3f9d", (0, (3, 1, 1, 1, 1, 1))),
-)
-_LINER: dict[str, Any] = {"color": "black", "lw": 1.2, "ls": (0, (6, 2, 1, 2)), "label": "$K_e$ of the liner"}
+# One more than charts of contacts need: five modes.
+_STYLES = (*STYLES, ("#7a3f9d", (0, (3, 1, 1, 1, 1, 1))))
 _WHITE: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 _BAND, _UNSTABLE = "0.82", "0.86"
 # Lobes named in the Campbell diagram: the deepest of each of so many modes.
@@ -89,8 +81,8 @@ def campbell_png(assessment: Assessment) -> bytes:
     note = "" if diagram.lobe_points else f"no lobe below {assessment.ke_max:,.0f} N/m"
     if diagram.lobe_points:
         key.append(_lobe_points(figure, axes, assessment))
-    _legend(figure, key, note)
-    return _png(figure)
+    legend_below(figure, key, note)
+    return as_png(figure)
 
 
 def mode_lobes_png(
@@ -119,9 +111,9 @@ def mode_lobes_png(
     silent = [names[j] for j in range(len(names)) if j + 1 not in alone]
     note = f"no lobe below {full.ke_max:,.0f} N/m: {', '.join(silent)}" if silent else ""
     if assessment.ke_liner is not None and assessment.ke_liner < full.ke_max:
-        key.append(axes.axhline(assessment.ke_liner, **_LINER))
-    _legend(figure, key, note)
-    return _png(figure)
+        key.append(axes.axhline(assessment.ke_liner, **LINER))
+    legend_below(figure, key, note)
+    return as_png(figure)
 
 
 def clearance_png(use: ClearanceUse, title: str, kinds: tuple[ModeKind, ...] = ()) -> bytes:
@@ -137,7 +129,7 @@ def clearance_png(use: ClearanceUse, title: str, kinds: tuple[ModeKind, ...] = (
         raise InvalidInput(
             "cold_clearance_m", "missing", "give a cold clearance: without one there is no running one"
         )
-    figure = Figure(figsize=(_SIZE[0], 6.6), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(SIZE[0], 6.6), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True)
     figure.suptitle(f"{title}: clearance", fontsize=11)
@@ -173,7 +165,7 @@ def clearance_png(use: ClearanceUse, title: str, kinds: tuple[ModeKind, ...] = (
     for axes in (above, below):
         axes.set_xlim(use.speed_hz[0], use.speed_hz[-1])
         axes.tick_params(labelsize=9)
-    return _png(figure)
+    return as_png(figure)
 
 
 def robust_png(
@@ -209,9 +201,9 @@ def robust_png(
     ]
     note = "" if verdict is None else _verdict_marks(axes, verdict, key)
     if ke_liner is not None and ke_liner < band.ke_max:
-        key.append(axes.axhline(ke_liner, **_LINER))
-    _legend(figure, key, note)
-    return _png(figure)
+        key.append(axes.axhline(ke_liner, **LINER))
+    legend_below(figure, key, note)
+    return as_png(figure)
 
 
 def _verdict_marks(axes: Axes, verdict: RobustVerdict, key: list[Any]) -> str:
@@ -326,22 +318,18 @@ def _untwist(axes: Axes, use: ClearanceUse) -> None:
 
 def _sheet(title: str, speed_hz: np.ndarray) -> tuple[Figure, Axes]:
     """Axes over rotor speed in Hz below and in rpm above."""
-    figure = Figure(figsize=_SIZE, dpi=DPI, layout="constrained")
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set_xlim(float(speed_hz.min()), float(speed_hz.max()))
     axes.set_title(title, fontsize=11, pad=10)
     axes.set_xlabel(r"rotor speed $\Omega$ [Hz]", fontsize=10)
-    rpm = axes.secondary_xaxis("top", functions=(_scaled_by(_RPM), _scaled_by(1 / _RPM)))
+    rpm = axes.secondary_xaxis("top", functions=(scaled_by(_RPM), scaled_by(1 / _RPM)))
     rpm.set_xlabel("[rpm]", fontsize=9)
     rpm.xaxis.set_major_formatter(FuncFormatter(lambda n, _: f"{n:,.0f}"))
     for each in (axes, rpm):
         each.tick_params(labelsize=9, direction="out")
     return figure, axes
-
-
-def _scaled_by(factor: float) -> Callable[[Any], Any]:
-    return lambda values: np.asarray(values) * factor
 
 
 def _ke_axis(axes: Axes, ke_max: float) -> None:
@@ -356,24 +344,3 @@ def _flanked(found: BoundarySolution) -> tuple[np.ndarray, np.ndarray]:
     leaves = np.flatnonzero(np.isfinite(ke[:-1]) != np.isfinite(ke[1:]))
     middle = 0.5 * (speed[leaves] + speed[leaves + 1])
     return np.insert(speed, leaves + 1, middle), np.insert(ke, leaves + 1, found.ke_max)
-
-
-def _legend(figure: Figure, key: list[Any], note: str = "") -> None:
-    """Under the axes, where it hides nothing; what has no mark to explain is a line above it."""
-    figure.legend(
-        handles=key,
-        title=note or None,
-        title_fontsize=9,
-        loc="outside lower center",
-        ncols=3 if len(key) > 4 else len(key),
-        fontsize=9,
-        frameon=False,
-        handlelength=2.2,
-        columnspacing=1.6,
-    )
-
-
-def _png(figure: Figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=DPI)
-    return out.getvalue()

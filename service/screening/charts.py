@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
+from service.screening.print_sheet import DPI, LINER, SIZE, STYLES, as_png, legend_below, scaled_by
 from training.answers import EXACT, BoundaryAnswers, MapAnswers
 
 if TYPE_CHECKING:
@@ -26,19 +26,9 @@ if TYPE_CHECKING:
     from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
 
-DPI = 300
-_SIZE = (7.2, 4.9)
 _UNSTABLE, _UNDECIDED = "0.70", "0.40"
 # Light enough for black lines to show, and darker than what it covers, in colour or in grey.
 _VERIFIED = (0.10, 0.35, 0.70, 0.28)
-# Told apart by dash and by lightness, so that a photocopy still shows which is which.
-_STYLES: tuple[tuple[str, Any], ...] = (
-    ("#000000", "-"),
-    ("#c8501e", (0, (5, 1.6))),
-    ("#2a6fbb", (0, (1.2, 1.2))),
-    ("#5a5a5a", "-."),
-)
-_LINER: dict[str, Any] = {"color": "black", "lw": 1.2, "ls": (0, (6, 2, 1, 2)), "label": "$K_e$ of the liner"}
 
 _WHITE: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
@@ -97,8 +87,8 @@ def map_png(
         key.append(_liner(axes, ke_liner))
     if worst is not None:
         key.append(_pointer(axes, worst))
-    _legend(figure, key, "; ".join(notes))
-    return _png(figure)
+    legend_below(figure, key, "; ".join(notes))
+    return as_png(figure)
 
 
 def boundaries_png(
@@ -120,7 +110,7 @@ def boundaries_png(
     what = next(iter(boundaries)) if len(boundaries) == 1 else "boundary by contact location"
     figure, axes = _sheet(blade, f"{blade.name}: {what}", first.speed_hz, top)
     key: list[Patch | Line2D] = []
-    for (name, boundary), (colour, dash) in zip(boundaries.items(), itertools.cycle(_STYLES), strict=False):
+    for (name, boundary), (colour, dash) in zip(boundaries.items(), itertools.cycle(STYLES), strict=False):
         none = "" if _reaches(boundary, top) else f" (none below {top:,.0f} N/m)"
         (line,) = axes.plot(
             *_flanked(boundary),
@@ -133,14 +123,14 @@ def boundaries_png(
     if ke_liner is not None:
         key.append(_liner(axes, ke_liner))
     axes.text(0.012, 0.03, "stable below each line", transform=axes.transAxes, fontsize=9, style="italic")
-    _legend(figure, key)
-    return _png(figure)
+    legend_below(figure, key)
+    return as_png(figure)
 
 
 def ranking_png(report: ScreeningReport) -> bytes:
     """Smallest destabilising K_e of each blade and contact, safest at the top."""
     rows = report.results
-    figure = Figure(figsize=(_SIZE[0], 1.5 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(SIZE[0], 1.5 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
     axes = figure.add_subplot()
     for i, row in enumerate(rows):
         ke = row.ke_max if row.worst is None else row.worst.ke
@@ -158,9 +148,9 @@ def ranking_png(report: ScreeningReport) -> bytes:
     axes.set_title("Ranking, safest first", fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
     if (ke_liner := rows[0].ke_liner) is not None:
-        axes.axvline(ke_liner, **_LINER)
+        axes.axvline(ke_liner, **LINER)
         axes.legend(loc="lower right", fontsize=9, frameon=False)
-    return _png(figure)
+    return as_png(figure)
 
 
 def described(contact: ContactConfiguration) -> str:
@@ -184,7 +174,7 @@ def described(contact: ContactConfiguration) -> str:
 
 def _sheet(blade: Blade, title: str, speed_hz: np.ndarray, ke_max: float) -> tuple[Figure, Axes]:
     """Axes with Ω/f₁ below, Ω in Hz above, and K_e with its power of ten."""
-    figure = Figure(figsize=_SIZE, dpi=DPI, layout="constrained")
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     f1 = blade.first_frequency_hz
@@ -199,16 +189,12 @@ def _sheet(blade: Blade, title: str, speed_hz: np.ndarray, ke_max: float) -> tup
     scale = 1.0 if -2 < power < 3 else 10.0**-power
     axes.set_ylabel(rf"$K_e$ [{unit}]", fontsize=11)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda ke, _: f"{ke * scale:.3g}"))
-    below = axes.secondary_xaxis("bottom", functions=(_scaled_by(1.0 / f1), _scaled_by(f1)))
+    below = axes.secondary_xaxis("bottom", functions=(scaled_by(1.0 / f1), scaled_by(f1)))
     below.set_xlabel(r"$\Omega / f_1$ at rest  [-]", fontsize=11)
     below.xaxis.set_major_locator(MaxNLocator(8))
     for each in (axes, below):
         each.tick_params(labelsize=10, direction="out")
     return figure, axes
-
-
-def _scaled_by(factor: float) -> Callable[[Any], Any]:
-    return lambda values: np.asarray(values) * factor
 
 
 def _verified(axes: Axes, answers: MapAnswers) -> tuple[list[Patch | Line2D], list[str]]:
@@ -223,7 +209,7 @@ def _verified(axes: Axes, answers: MapAnswers) -> tuple[list[Patch | Line2D], li
 
 
 def _liner(axes: Axes, ke_liner: float) -> Line2D:
-    return axes.axhline(ke_liner, **_LINER)
+    return axes.axhline(ke_liner, **LINER)
 
 
 def _pointer(axes: Axes, worst: CriticalSpeed) -> Line2D:
@@ -292,26 +278,3 @@ def _flanked(boundary: BoundaryAnswers) -> tuple[np.ndarray, np.ndarray]:
 
 def _reaches(boundary: BoundaryAnswers, top: float) -> bool:
     return bool((boundary.critical_ke <= top).any())
-
-
-def _legend(figure: Figure, key: list[Patch | Line2D], note: str = "") -> None:
-    """Under the axes, where it hides nothing; what has no mark to explain is a line above it."""
-    # A map's long keys fit in three columns, the names of contacts in four.
-    columns = 3 if len(key) > 4 else len(key)
-    figure.legend(
-        handles=key,
-        title=note or None,
-        title_fontsize=9,
-        loc="outside lower center",
-        ncols=columns,
-        fontsize=9,
-        frameon=False,
-        handlelength=2.2,
-        columnspacing=1.6,
-    )
-
-
-def _png(figure: Figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=DPI)
-    return out.getvalue()

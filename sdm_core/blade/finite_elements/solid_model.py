@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 from sdm_core.blade.finite_elements.material import Material
 from sdm_core.blade.solid_mesh import SolidMesh
 
-# Elements whose fields are held at once: keeps the memory of an assembly below 100 MB.
+# Elements whose fields at quadrature points are held at once; an element matrix itself takes 29 kB.
 _ELEMENTS_AT_ONCE = 512
 
 
