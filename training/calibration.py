@@ -11,14 +11,16 @@ import numpy as np
 
 from sdm_core.version import __version__
 from training.certificate import DEFAULT_ALPHA, CalibrationFailed, Certificate, certify
-from training.contact_class import PERMANENT
+from training.contact_class import ARCS, PERMANENT, in_words
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation, evaluate
-from training.labelling import critical_kappa
+from training.labelling import critical_kappa, point_verdicts
 from training.reference_space import NAME, ReferenceSample, reference_sample
 from training.registry import Model, load_model, write_model
 from training.seeds import seed_for
 from training.surrogate import Surrogate
+
+CLASSES = (PERMANENT, ARCS)
 
 Progress = Callable[[str, int, int, str], None]
 """Called with (stage, done, of, remark)."""
@@ -31,8 +33,9 @@ class CalibrationSettings:
     Attributes
     ----------
     points, evaluation_points
-        Independent points of the reference design space. The strictest rate of the ladder, 1e-4, takes
-        46,050 points accepted as stable without one error, 92,000 in all; more leave room for errors.
+        Independent points of the reference design space in each class of contact. The strictest rate of the
+        ladder, 1e-4, takes 46,050 points accepted as stable without one error, 92,000 in all; more leave
+        room for errors.
     seed
         The user's; either sample has a seed of its own derived from it.
     workers
@@ -47,16 +50,19 @@ class CalibrationSettings:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What calibration found, ready for a model card."""
+    """What calibration found, ready for a model card; evaluations by class of contact."""
 
     certificates: tuple[Certificate, ...]
-    evaluation: Evaluation
-    evaluation_seed: int
+    evaluations: dict[str, Evaluation]
+    evaluation_seeds: dict[str, int]
 
     def card(self) -> dict[str, Any]:
         """The part of a model card that a calibration writes."""
-        evaluated = {"seed": self.evaluation_seed, "alpha": DEFAULT_ALPHA}
-        return {"evaluation": {**self.evaluation.to_dict(), **evaluated}, "calibrated_by": __version__}
+        evaluated = {
+            contact: {**found.to_dict(), "seed": self.evaluation_seeds[contact], "alpha": DEFAULT_ALPHA}
+            for contact, found in self.evaluations.items()
+        }
+        return {"evaluation": evaluated, "calibrated_by": __version__}
 
 
 def calibrated(
@@ -65,37 +71,69 @@ def calibrated(
     settings: CalibrationSettings,
     progress: Progress = lambda stage, done, of, remark: None,
 ) -> Calibration:
-    """Certify a surrogate on one independent sample, and count its mistakes on another.
+    """Certify a surrogate on an independent sample of each class of contact, count its mistakes on others.
 
     Raises
     ------
     CalibrationFailed
-        When no verification band keeps `DEFAULT_ALPHA`.
+        When no verification band keeps `DEFAULT_ALPHA` in one of the classes.
     """
-    seed = seed_for("calibration", settings.seed)
-    sample, critical = truth(settings.points, seed, settings.workers, "calibrate", progress)
-    boundary, inside = surrogate.boundary(sample.cases), design_space.contains(sample.cases)
-    unstable = sample.ke > critical
-    certificate = certify(
-        boundary, inside, sample.ke, unstable, distribution=NAME, contact=PERMANENT, seed=seed
-    )
-    if DEFAULT_ALPHA not in certificate.alphas:
-        raise CalibrationFailed(
-            f"no band keeps a false-stable rate of {DEFAULT_ALPHA:g} on {settings.points} points"
-        )
+    certificates, evaluations, seeds = [], {}, {}
+    for contact in CLASSES:
+        certificate = certified(surrogate, design_space, contact, settings, progress)
+        if DEFAULT_ALPHA not in certificate.alphas:
+            raise CalibrationFailed(
+                f"no band keeps a false-stable rate of {DEFAULT_ALPHA:g} in {in_words(contact)} "
+                f"on {settings.points} points"
+            )
+        certificates.append(certificate)
+    for certificate in certificates:
+        contact = certificate.contact
+        seeds[contact] = seed_for(_purpose("evaluation", contact), settings.seed)
+        sample = reference_sample(settings.evaluation_points, seeds[contact], contact)
+        inside = design_space.contains(sample.cases, sample.ke)
 
-    seed = seed_for("evaluation", settings.seed)
-    sample, critical = truth(settings.evaluation_points, seed, settings.workers, "evaluate", progress)
-    evaluation = evaluate(
-        surrogate.boundary(sample.cases),
-        certificate.line().band,
-        design_space.contains(sample.cases),
+        def report(done: int, of: int, contact: str = contact) -> None:
+            progress("evaluate", done, of, in_words(contact))
+
+        critical, unstable = truth(sample, settings.workers, report)
+        evaluations[contact] = evaluate(
+            surrogate.boundary(sample.cases),
+            certificate.line().band,
+            inside,
+            sample.ke,
+            critical,
+            unstable,
+            distribution=NAME,
+            ke_max=design_space.largest_ke(sample.cases),
+        )
+    return Calibration(tuple(certificates), evaluations, seeds)
+
+
+def certified(
+    surrogate: Surrogate,
+    design_space: DesignSpace,
+    contact: str,
+    settings: CalibrationSettings,
+    progress: Progress = lambda stage, done, of, remark: None,
+) -> Certificate:
+    """The certificate of one class of contact, of verdicts at points drawn for nothing else."""
+    seed = seed_for(_purpose("calibration", contact), settings.seed)
+    sample = reference_sample(settings.points, seed, contact)
+    stable = point_verdicts(
+        sample.cases,
         sample.ke,
-        critical,
-        sample.ke > critical,
-        distribution=NAME,
+        workers=settings.workers,
+        progress=lambda done, of: progress("calibrate", done, of, in_words(contact)),
     )
-    return Calibration((certificate,), evaluation, seed)
+    inside = design_space.contains(sample.cases, sample.ke)
+    boundary = surrogate.boundary(sample.cases)
+    # A point that the exact core leaves undecided counts as unstable: to call it stable is an error.
+    return certify(boundary, inside, sample.ke, stable != 1.0, distribution=NAME, contact=contact, seed=seed)
+
+
+def _purpose(stage: str, contact: str) -> str:
+    return stage if contact == PERMANENT else f"{stage}, {contact}"
 
 
 def recalibrate(
@@ -144,15 +182,16 @@ def _seed_of(model: Model) -> int:
 
 
 def truth(
-    points: int,
-    seed: int,
-    workers: int,
-    stage: str,
-    progress: Progress = lambda stage, done, of, remark: None,
-) -> tuple[ReferenceSample, np.ndarray]:
-    """Points of the reference space in permanent contact, and their exact first crossings, N/m."""
-    sample = reference_sample(points, seed)
-    kappa = critical_kappa(
-        sample.cases, workers=workers, progress=lambda done, of: progress(stage, done, of, "exact core")
-    )
-    return sample, kappa * sample.cases.stiffness_scale
+    sample: ReferenceSample, workers: int, progress: Callable[[int, int], None] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exact first crossings, N/m, and which points are unstable; shape (m,) each.
+
+    In permanent contact the first crossing decides. With arcs stability may return above it, so that every
+    point gets a verdict of its own.
+    """
+    kappa = critical_kappa(sample.cases, workers=workers, progress=progress)
+    critical = kappa * sample.cases.stiffness_scale
+    unstable, arcs = sample.ke > critical, ~sample.cases.permanent
+    if arcs.any():
+        unstable[arcs] = point_verdicts(sample.cases[arcs], sample.ke[arcs], workers=workers) != 1.0
+    return critical, unstable

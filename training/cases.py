@@ -1,25 +1,27 @@
-"""Cases as the surrogate sees them: dimensionless, padded to five modes, any number of tip nodes."""
+"""Cases as the surrogate sees them: padded to five modes and four arcs, any number of tip nodes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from sdm_core.blade import Blade
-from sdm_core.contact import ContactConfiguration
+from sdm_core.contact import Arc, ContactConfiguration, Segment
 from sdm_core.permanent_contact.receptance import ContactReceptance
+from sdm_core.rubbing_blade import RubbingBlade
 
 MODES = 5
+ARCS = 4
 
 
 @dataclass(frozen=True)
 class CaseBatch:
-    """m cases of a blade at a speed in permanent contact; K_e is not part of a case.
+    """m cases of a blade in contact at a speed; K_e is not part of a case.
 
     The dynamics sees the tip only through G (DESIGN, fact 7), so a case is its frequencies,
-    damping, G and speed. Modes beyond those a blade has are padded with ones the contact cannot
-    reach (G_jj = 0).
+    damping, G, speed and engagement. Modes beyond those a blade has are padded with ones the contact
+    cannot reach (G_jj = 0).
 
     Attributes
     ----------
@@ -33,6 +35,11 @@ class CaseBatch:
         Ω, Hz, shape (m,).
     mode_count
         Modes the blade has, shape (m,).
+    arcs
+        Start and end of each arc of contact, revolutions, NaN where there is none, shape (m, 4, 2).
+        Permanent contact is one arc from 0 to 1.
+    arc_count
+        Arcs there are, shape (m,): those beyond four are not in `arcs`. Zero where engagement is smooth.
     """
 
     omega: np.ndarray
@@ -40,18 +47,14 @@ class CaseBatch:
     contact_matrix: np.ndarray
     speed_hz: np.ndarray
     mode_count: np.ndarray
+    arcs: np.ndarray
+    arc_count: np.ndarray
 
     def __len__(self) -> int:
         return len(self.speed_hz)
 
     def __getitem__(self, index: slice | np.ndarray) -> CaseBatch:
-        return CaseBatch(
-            self.omega[index],
-            self.damping_ratio[index],
-            self.contact_matrix[index],
-            self.speed_hz[index],
-            self.mode_count[index],
-        )
+        return CaseBatch(*(getattr(self, f.name)[index] for f in fields(self)))
 
     @classmethod
     def from_arrays(
@@ -60,8 +63,11 @@ class CaseBatch:
         damping_ratio: np.ndarray,
         contact_shape: np.ndarray,
         speed_hz: np.ndarray,
+        arcs: np.ndarray | None = None,
     ) -> CaseBatch:
-        """From Λ (m, n) in rad/s, ξ (n,) or (m, n), W^½V_bᵀ (m, r, n) in kg^-1/2 and speeds (m,).
+        """From Λ (m, n) in rad/s, ξ (n,) or (m, n), W^½V_bᵀ (m, r, n) in kg^-1/2, speeds (m,).
+
+        Arcs have shape (m, a, 2); without them contact is permanent.
 
         Modes are sorted by frequency; a blade with more than five keeps its first five, and
         `DesignSpace.contains` refuses it by `mode_count`.
@@ -78,13 +84,17 @@ class CaseBatch:
         contact = np.zeros((m, MODES, MODES))
         padded_omega[:, :kept], padded_damping[:, :kept] = omega_sorted, damping_sorted
         contact[:, :kept, :kept] = np.swapaxes(shape, 1, 2) @ shape
-        return cls(padded_omega, padded_damping, contact, np.asarray(speed_hz, dtype=float), np.full(m, n))
+        engaged, arc_count = _padded(np.tile([[0.0, 1.0]], (m, 1, 1)) if arcs is None else arcs)
+        speed = np.asarray(speed_hz, dtype=float)
+        return cls(padded_omega, padded_damping, contact, speed, np.full(m, n), engaged, arc_count)
 
     @classmethod
     def from_blade(
         cls, blade: Blade, contact: ContactConfiguration, speed_hz: np.ndarray, *, extrapolate: bool = False
     ) -> CaseBatch:
-        """A blade in contact at many speeds; arcs of contact are not looked at.
+        """A blade in contact at many speeds.
+
+        Smooth engagement has no arcs: `DesignSpace.contains` refuses it by `arc_count`.
 
         Raises
         ------
@@ -96,13 +106,13 @@ class CaseBatch:
         root = np.sqrt(contact.weight_vector(blade.tip_nodes))
         omega, shape = blade.at_speeds(speed_hz, extrapolate=extrapolate)
         contact_shape = np.swapaxes(shape * root, 1, 2)
-        return cls.from_arrays(omega, blade.damping_ratio, contact_shape, speed_hz)
+        arcs = np.broadcast_to(arcs_of(contact), (len(speed_hz), *arcs_of(contact).shape))
+        return cls.from_arrays(omega, blade.damping_ratio, contact_shape, speed_hz, arcs)
 
     @classmethod
     def concatenate(cls, batches: list[CaseBatch]) -> CaseBatch:
         """One batch after another."""
-        names = ("omega", "damping_ratio", "contact_matrix", "speed_hz", "mode_count")
-        return cls(*(np.concatenate([getattr(b, name) for b in batches]) for name in names))
+        return cls(*(np.concatenate([getattr(b, f.name) for b in batches]) for f in fields(cls)))
 
     @property
     def compliance(self) -> np.ndarray:
@@ -115,6 +125,35 @@ class CaseBatch:
         with np.errstate(divide="ignore"):
             return 1.0 / self.compliance.max(axis=1)
 
+    @property
+    def permanent(self) -> np.ndarray:
+        """Where contact never ceases, shape (m,)."""
+        return (self.arc_count == 1) & (np.nan_to_num(self.arcs[:, 0, 1] - self.arcs[:, 0, 0]) >= 1.0)
+
+    @property
+    def engaged_share(self) -> np.ndarray:
+        """Share of the revolution in contact, the mean of γ; shape (m,)."""
+        return np.nansum(self.arcs[:, :, 1] - self.arcs[:, :, 0], axis=1)
+
+    def problem(self, i: int) -> RubbingBlade:
+        """Case i for the exact core, with K_e = 0."""
+        receptance = self.receptance(i)
+        arcs: tuple[Arc, ...] | None = None
+        segments: tuple[Segment, ...] = (Segment(1.0, True),)
+        if not self.permanent[i]:
+            held = self.arcs[i, : self.arc_count[i]]
+            contact = ContactConfiguration({"tip": 1.0}, held.tolist())
+            arcs, segments = contact.arcs, contact.segments
+        return RubbingBlade(
+            receptance.omega,
+            receptance.damping_ratio,
+            receptance.factor.T,
+            float(self.speed_hz[i]),
+            0.0,
+            arcs,
+            segments,
+        )
+
     def receptance(self, i: int) -> ContactReceptance:
         """Receptance of case i at its contact nodes, for the exact core."""
         n = min(int(self.mode_count[i]), MODES)
@@ -123,3 +162,29 @@ class CaseBatch:
         keep = value > 1e-13 * max(value.max(), 1e-300)
         factor = vector[:, keep] * np.sqrt(value[keep])
         return ContactReceptance(self.omega[i, :n], self.damping_ratio[i, :n], factor)
+
+
+def arcs_of(contact: ContactConfiguration) -> np.ndarray:
+    """Arcs of a contact as start and end in revolutions, touching ones as one; shape (a, 2).
+
+    Turned so that the first starts at 0, which changes nothing about stability. None of them where engagement
+    is smooth.
+    """
+    arcs: list[list[float]] = []
+    at, touching = 0.0, False
+    for segment in contact.segments:
+        if segment.engaged and touching:
+            arcs[-1][1] = at + segment.length
+        elif segment.engaged:
+            arcs.append([at, at + segment.length])
+        at, touching = at + segment.length, segment.engaged
+    return np.array(arcs).reshape(-1, 2)
+
+
+def _padded(arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Four arcs each, NaN where there are fewer, and how many there are; from shape (m, a, 2)."""
+    given = np.asarray(arcs, dtype=float)
+    out = np.full((len(given), ARCS, 2), np.nan)
+    kept = min(ARCS, given.shape[1])
+    out[:, :kept] = given[:, :kept]
+    return out, np.isfinite(given[:, :, 0]).sum(axis=1)

@@ -8,15 +8,26 @@ from typing import Any
 import numpy as np
 
 from sdm_core.errors import InvalidInput, RubscreenError
+from training.contact_class import ARCS, PERMANENT
 from training.learn_then_test import simultaneous_sequences
 from training.surrogate import PredictedBoundary
-from training.verification_band import VerificationBand
+from training.verification_band import FIVE_PERCENT, ONE_PERCENT, VerificationBand
 
-# The rates a user may ask for, loosest first, and the candidate bands in spreads, safest first. Both are
-# set before any data is seen: they are the order of the tests. The bands end at ten, though fewer may do:
-# real blades are drawn from no distribution, and in permanent contact verifying a few more costs little.
+# The rates a user may ask for, loosest first, and the candidate bands, safest first. Both are set before any
+# data is seen: they are the order of the tests. In permanent contact the bands end at ten spreads and 5 %,
+# though less may do: real blades are drawn from no distribution, and verifying a few more costs little. With
+# arcs a verdict costs much more than the rest of an answer, and the bands end where few points are left.
 LADDER = (1e-2, 5e-3, 1e-3, 5e-4, 1e-4)
-BANDS = (80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0)
+BANDS = {
+    PERMANENT: tuple(
+        VerificationBand(s, FIVE_PERCENT)
+        for s in (80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0)
+    ),
+    ARCS: tuple(
+        VerificationBand(s, ONE_PERCENT)
+        for s in (40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0, 8.0, 7.0, 6.0, 5.0, 4.5, 4.0, 3.5, 3.0)
+    ),
+}
 CONFIDENCE = 0.95
 # A model that does not reach this one is not worth serving.
 DEFAULT_ALPHA = 5e-4
@@ -34,8 +45,8 @@ class CertifiedBand:
     ----------
     alpha
         Bound on P(unstable | answered stable, not verified).
-    spreads
-        Half width of the verification band in learned spreads.
+    spreads, least_half_width
+        Of the verification band, in learned spreads and in log10 K_e.
     accepted, errors
         Calibration points answered stable without verification, and how many of them were unstable.
     verified_share
@@ -51,11 +62,12 @@ class CertifiedBand:
     errors: int
     verified_share: float
     false_unstable_rate: float
+    least_half_width: float = FIVE_PERCENT
 
     @property
     def band(self) -> VerificationBand:
         """What must be verified."""
-        return VerificationBand(self.spreads)
+        return VerificationBand(self.spreads, self.least_half_width)
 
 
 @dataclass(frozen=True)
@@ -133,7 +145,7 @@ def certify(
     distribution: str,
     contact: str,
     seed: int,
-    bands: tuple[float, ...] = BANDS,
+    bands: tuple[VerificationBand, ...] | None = None,
     alphas: tuple[float, ...] = LADDER,
     confidence: float = CONFIDENCE,
 ) -> Certificate:
@@ -149,10 +161,11 @@ def certify(
     ke, unstable
         K_e in N/m and the exact verdict, shape (m,) each.
     bands, alphas
-        Candidates in spreads and rates, both falling.
+        Candidates, the safest first, and rates, falling; None is `BANDS` of the class of contact.
     """
+    bands = BANDS[contact] if bands is None else bands
     says_stable = boundary.score(ke) < 0
-    lines = [_counted(VerificationBand(s), boundary, inside, ke, unstable, says_stable) for s in bands]
+    lines = [_counted(band, boundary, inside, ke, unstable, says_stable) for band in bands]
     errors, accepted = [line.errors for line in lines], [line.accepted for line in lines]
     counts = simultaneous_sequences(errors, accepted, alphas, confidence)
     table = tuple(
@@ -161,7 +174,9 @@ def certify(
         if held
     )
     missed = tuple(alpha for alpha, held in zip(alphas, counts, strict=True) if not held)
-    return Certificate(distribution, contact, confidence, len(ke), seed, table, bands, missed)
+    return Certificate(
+        distribution, contact, confidence, len(ke), seed, table, tuple(b.spreads for b in bands), missed
+    )
 
 
 def _counted(
@@ -181,4 +196,5 @@ def _counted(
         int((stable & unstable).sum()),
         float(verified.mean()),
         float((risky & ~unstable).sum() / max(1, risky.sum())),
+        band.least_half_width,
     )

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,15 @@ import numpy as np
 from sdm_core.errors import DamagedFile, InvalidInput
 from training.cases import CaseBatch
 
-FORMAT = "rubscreen/dataset/1"
-_ARRAYS = ("omega", "damping_ratio", "contact_matrix", "speed_hz", "mode_count")
+FORMAT = "rubscreen/dataset/2"
+_ARRAYS = tuple(field.name for field in fields(CaseBatch))
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Cases and the κ of their first crossings (infinite: none up to the labelling's largest κ).
+    """Cases and the κ of their first crossings.
+
+    Infinite where there is none up to the design space's largest κ, NaN where it is not known.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The design space the surrogate is trained on: named, bounded, sampled space-filling."""
+"""The design space the surrogate is trained on: named, bounded, with a reason for what lies outside."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
-from sdm_core.errors import InvalidInput
-from training.cases import MODES, CaseBatch
+from training.cases import ARCS, MODES, CaseBatch
 
 Range = tuple[float, float]
 
@@ -20,7 +17,7 @@ class DesignSpace:
     """Bounds of the training domain; a little wider than the reference space (DESIGN, section 7).
 
     Amplitudes and correlations at the contact are not bounded: modes from dominant to invisible
-    and every correlation are sampled.
+    and every correlation are sampled. Nor are places and lengths of arcs.
 
     Attributes
     ----------
@@ -34,19 +31,33 @@ class DesignSpace:
         Largest ratio of a mode's ξ to their geometric mean, or the inverse.
     speed_ratio
         Ω/f1, f1 at that speed.
+    arc_count, engaged_share
+        Arcs of contact, and the share of the revolution in contact; permanent contact apart.
+    largest_kappa, largest_kappa_with_arcs
+        κ = K_e·max_j G_jj/ω_j² up to which first crossings were looked for.
     """
 
-    name: str = "permanent-contact/1"
+    name: str = "contact/1"
     mode_count: tuple[int, int] = (1, MODES)
-    first_ratio: Range = (1.4, 5.2)
-    next_ratio: Range = (1.02, 2.5)
+    first_ratio: Range = (1.3, 6.0)
+    next_ratio: Range = (1.01, 2.7)
     damping_ratio: Range = (1.2e-4, 1.7e-2)
     damping_spread: float = 2.0
-    speed_ratio: Range = (0.045, 0.85)
+    speed_ratio: Range = (0.045, 0.9)
+    arc_count: tuple[int, int] = (1, ARCS)
+    engaged_share: Range = (0.03, 0.95)
+    largest_kappa: float = 4.0
+    largest_kappa_with_arcs: float = 1.5
 
-    def contains(self, cases: CaseBatch) -> np.ndarray:
-        """Which cases lie inside, shape (m,)."""
-        return self.first_violation(cases) == ""
+    def contains(self, cases: CaseBatch, ke: np.ndarray | None = None) -> np.ndarray:
+        """Which cases lie inside, shape (m,); with K_e in N/m, shape (m,), which points do."""
+        inside = self.first_violation(cases) == ""
+        return inside if ke is None else inside & (ke <= self.largest_ke(cases))
+
+    def largest_ke(self, cases: CaseBatch) -> np.ndarray:
+        """K_e up to which the surrogate may be asked, N/m, shape (m,)."""
+        kappa = np.where(cases.permanent, self.largest_kappa, self.largest_kappa_with_arcs)
+        return kappa * cases.stiffness_scale
 
     def first_violation(self, cases: CaseBatch) -> np.ndarray:
         """Why a case lies outside, in words; an empty string where it is inside. Shape (m,)."""
@@ -65,6 +76,14 @@ class DesignSpace:
 
         mark(cases.mode_count > self.mode_count[1], f"more than {self.mode_count[1]} modes")
         mark(~reached, "no mode moves the contact nodes")
+        with_arcs, share = ~cases.permanent, cases.engaged_share
+        mark(cases.arc_count == 0, "smooth engagement, which this model does not cover")
+        mark(
+            with_arcs & (cases.arc_count > self.arc_count[1]),
+            f"more than {self.arc_count[1]} arcs of contact",
+        )
+        bare = with_arcs & _outside(share, self.engaged_share)
+        mark(bare, f"share of the revolution in contact outside {_text(self.engaged_share)}")
         mark(_outside(speed_ratio, self.speed_ratio), f"speed/f1 outside {_text(self.speed_ratio)}")
         first = pair[:, 0] & _outside(ratio[:, 0], self.first_ratio)
         mark(first, f"f2/f1 outside {_text(self.first_ratio)}")
@@ -76,54 +95,6 @@ class DesignSpace:
         mark(uneven, f"damping of the modes differs by more than a factor {self.damping_spread:g}")
         return out
 
-    def sample(self, designs: int, speeds_each: int, seed: int) -> CaseBatch:
-        """Space-filling sample: `designs` blades (scrambled Sobol points), each at several speeds.
-
-        Half the mode shapes are quadratics along the chord at 1 to 12 nodes, as real blades
-        have them, half are of any rank, so that every correlation G_jk/√(G_jj G_kk) occurs.
-
-        Raises
-        ------
-        InvalidInput
-            For no designs or no speeds.
-        """
-        if designs < 1 or speeds_each < 1:
-            raise InvalidInput("designs", designs, "give at least one design and one speed")
-        sobol = qmc.Sobol(_Columns.total + speeds_each, rng=np.random.default_rng(seed))
-        points = sobol.random(1 << int(np.ceil(np.log2(designs))))[:designs]
-        points = np.clip(points, 1e-9, 1 - 1e-9)
-        rng = np.random.default_rng(seed + 1)
-        return CaseBatch.concatenate([self._design(u, speeds_each, rng) for u in points])
-
-    def _design(self, u: np.ndarray, speeds_each: int, rng: np.random.Generator) -> CaseBatch:
-        n = 1 + int(u[_Columns.modes] * MODES)
-        ratios = np.ones(n)
-        if n > 1:
-            ratios[1] = _between(u[_Columns.ratio], self.first_ratio)
-            for j in range(2, n):
-                ratios[j] = _between(u[_Columns.ratio + j - 1], self.next_ratio)
-        omega = 2 * np.pi * np.cumprod(ratios)
-        mean = np.exp(_between(u[_Columns.damping], tuple(np.log(self.damping_ratio))))
-        spread = _between(u[_Columns.spread : _Columns.spread + n], (-0.5, 0.5))
-        damping = np.clip(mean * np.exp(spread), *self.damping_ratio)
-        size = np.exp(_between(u[_Columns.size : _Columns.size + n], (np.log(0.7), np.log(43.0))))
-        # A node near a nodal line of a mode hardly feels it.
-        size *= np.where(rng.random(n) < 0.15, 10.0 ** rng.uniform(-3.0, 0.0, n), 1.0)
-        normal = ndtri(u[_Columns.shape : _Columns.shape + 3 * n]).reshape(n, 3)
-        if u[_Columns.family] < 0.5:
-            r = int(rng.choice([1, 1, 2, 3, 5, 9, 12]))
-            chord = np.linspace(-1, 1, r) if r > 1 else np.zeros(1)
-            shape = normal @ np.stack([chord**0, chord, chord**2]) * (1 + 0.1 * rng.normal(size=(n, r)))
-            shape = shape * np.sqrt(rng.uniform(0.3, 1.0, r))
-        else:
-            rank = 1 + int(rng.integers(0, 5))
-            shape = np.concatenate([normal, rng.normal(size=(n, 3))], axis=1)[:, :rank]
-        shape = shape * (size / np.abs(shape).max(axis=1))[:, None]
-        low, high = np.log(self.speed_ratio)
-        speed = np.exp(low + (high - low) * u[_Columns.total : _Columns.total + speeds_each])
-        m = speeds_each
-        return CaseBatch.from_arrays(np.tile(omega, (m, 1)), damping, np.tile(shape.T, (m, 1, 1)), speed)
-
     def to_dict(self) -> dict[str, Any]:
         """For the model card."""
         return asdict(self)
@@ -133,20 +104,6 @@ class DesignSpace:
         """From the model card."""
         values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
         return cls(**values)
-
-
-class _Columns:
-    """Which coordinate of a Sobol point means what."""
-
-    modes, family, damping, ratio = 0, 1, 2, 3
-    spread = ratio + MODES - 1
-    size = spread + MODES
-    shape = size + MODES
-    total = shape + 3 * MODES
-
-
-def _between(u: Any, limits: Any) -> Any:
-    return limits[0] + (limits[1] - limits[0]) * u
 
 
 def _outside(values: np.ndarray, limits: Range) -> np.ndarray:

@@ -96,8 +96,8 @@ def evaluate(
     inside
         Which points lie in the design space; the others would be verified.
     ke, critical_ke, unstable
-        K_e in N/m, the exact first crossing (infinite where there is none) and the exact verdict,
-        shape (m,) each.
+        K_e in N/m, the exact first crossing (infinite where there is none, NaN where it is not known) and
+        the exact verdict, shape (m,) each.
     ke_max
         Largest K_e a crossing is looked for at; beyond it both sides say "none".
     """
@@ -138,4 +138,4 @@ def _boundary_error(predicted: np.ndarray, exact: np.ndarray, ke_max: np.ndarray
     error = np.zeros(len(exact))
     error[seen & there] = np.abs(predicted[seen & there] / exact[seen & there] - 1)
     error[seen != there] = np.inf
-    return error
+    return error[~np.isnan(exact)]

@@ -1,21 +1,27 @@
-"""One command trains: sample, label, fit, calibrate, evaluate, write."""
+"""One command trains: sample, label, fit, ask where it is unsure, calibrate, evaluate, write."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
 from sdm_core.version import __version__
-from training.calibration import CalibrationSettings, Progress, calibrated
+from training.active_learning import ActiveLearner
+from training.calibration import CLASSES, CalibrationSettings, Progress, calibrated
 from training.dataset import Dataset
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
-from training.labelling import KAPPA_MAX, critical_kappa
+from training.labelling import critical_kappa
+from training.monitoring import Goal, Monitor
 from training.registry import Model, write_model
+from training.surrogate import Surrogate
 
 
 @dataclass(frozen=True)
@@ -24,21 +30,33 @@ class TrainingSettings:
 
     Attributes
     ----------
-    designs, speeds_each
-        Size of the training set: blades, and speeds of each.
-    calibration_points, evaluation_points
-        Independent points of the reference design space.
+    first_cases
+        Labelled before the first fit, space-filling, half of them with arcs.
+    cases_each, rounds
+        Labelled in each round of asking, and the most rounds there are.
+    round_epochs
+        Of the fit after each round but the last.
+    goal
+        The certified figure at which asking stops; None asks in every round.
+    calibration_points, evaluation_points, monitor_points
+        Independent points of the reference design space in each class of contact.
     seed
-        Of everything; calibration and evaluation each have a seed of their own derived from it.
+        Of everything; calibration, evaluation and monitoring each have a seed of their own derived from it.
     threads
-        Torch threads and labelling processes. With seed, thread count and machine the same, so
-        are the figures.
+        Torch threads and labelling processes. With seed, thread count, device and machine the same, so are
+        the figures.
+    fit
+        The last fit.
     """
 
-    designs: int = 32_768
-    speeds_each: int = 6
+    first_cases: int = 98_304
+    cases_each: int = 65_536
+    rounds: int = 4
+    round_epochs: int = 8
+    goal: Goal | None = field(default_factory=Goal)
     calibration_points: int = 200_000
     evaluation_points: int = 20_000
+    monitor_points: int = 100_000
     seed: int = 2013
     threads: int = 2
     fit: FitSettings = field(default_factory=FitSettings)
@@ -46,12 +64,27 @@ class TrainingSettings:
 
 
 @dataclass(frozen=True)
+class Round:
+    """One round of asking: labels so far, and what the monitoring sample says of the surrogate after it.
+
+    Attributes
+    ----------
+    verified_share
+        By class of contact, at the goal's rate; infinite where the rate is not proven.
+    """
+
+    labels: int
+    verified_share: dict[str, float]
+
+
+@dataclass(frozen=True)
 class TrainingResult:
-    """The written model, its held-out figures and how long each stage took, s."""
+    """The written model, its held-out figures by class of contact, and how long each stage took, s."""
 
     model: Model
-    evaluation: Evaluation
+    evaluations: dict[str, Evaluation]
     dataset_path: Path
+    rounds: tuple[Round, ...]
     seconds: dict[str, float]
 
 
@@ -80,35 +113,18 @@ def train(
         When no verification band keeps the false-stable bound; nothing is written then.
     """
     s = settings or TrainingSettings()
-    seconds: dict[str, float] = {}
-    clock = time.perf_counter()
-
-    def lap(stage: str) -> None:
-        nonlocal clock
-        seconds[stage] = round(time.perf_counter() - clock, 1)
-        clock = time.perf_counter()
-
-    dataset = labelled_dataset(s, progress)
-    dataset_path = dataset.write(data_folder or models_folder.parent / "datasets")
-    lap("label")
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(s.threads)
-    try:
-        surrogate = fit(
-            dataset.cases,
-            dataset.kappa,
-            s.fit,
-            seed=s.seed,
-            progress=lambda epoch, of, loss: progress("fit", epoch, of, f"loss {loss:.4f}"),
-        )
-    finally:
-        torch.set_num_threads(before)
-    lap("fit")
+    watch = _Watch()
+    with _torch_threads(s.threads):
+        learner, rounds = _asked(s, watch, progress)
+        cases, kappa = learner.labelled
+        dataset = Dataset(cases, kappa, _provenance(s, learner.labels, rounds))
+        dataset_path = dataset.write(data_folder or models_folder.parent / "datasets")
+        surrogate = _fitted(learner, s, s.fit, progress, "fit")
+        watch.lap("fit")
 
     points = CalibrationSettings(s.calibration_points, s.evaluation_points, s.seed, s.threads)
     calibration = calibrated(surrogate, s.design_space, points, progress)
-    lap("calibrate and evaluate")
+    watch.lap("calibrate and evaluate")
 
     card = {
         "code_version": __version__,
@@ -121,25 +137,86 @@ def train(
     model = write_model(
         surrogate, s.design_space, calibration.certificates, card, models_folder, activate=activate
     )
-    return TrainingResult(model, calibration.evaluation, dataset_path, seconds)
+    return TrainingResult(model, calibration.evaluations, dataset_path, tuple(rounds), watch.seconds)
 
 
-def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
-    """Sample the design space and label it with the exact core."""
-    progress("sample", 0, s.designs, "")
-    cases = s.design_space.sample(s.designs, s.speeds_each, s.seed)
-    progress("sample", s.designs, s.designs, "")
-    kappa = critical_kappa(
-        cases, workers=s.threads, progress=lambda done, of: progress("label", done, of, "exact core")
+def _asked(s: TrainingSettings, watch: _Watch, progress: Progress) -> tuple[ActiveLearner, list[Round]]:
+    """Label, fit and ask again, until the goal is certified on the monitoring sample or rounds are over."""
+    learner, rounds = ActiveLearner(s.design_space, s.seed), []
+    monitor = None
+    for number in range(s.rounds + 1):
+        stage = f"label, round {number} of {s.rounds}"
+        progress(stage, 0, 1, "drawing")
+        cases = learner.ask(s.cases_each if number else s.first_cases)
+
+        def labelled(done: int, of: int, stage: str = stage) -> None:
+            progress(stage, done, of, "exact core")
+
+        kappa = critical_kappa(cases, s.design_space, workers=s.threads, progress=labelled)
+        learner.tell(cases, kappa)
+        watch.lap("label")
+        if number == s.rounds:
+            break
+        short = replace(s.fit, epochs=s.round_epochs)
+        learner.learnt(_fitted(learner, s, short, progress, f"fit, round {number} of {s.rounds}"))
+        watch.lap("fit between rounds")
+        if s.goal is None:
+            continue
+        monitor = monitor or Monitor.drawn(CLASSES, s.monitor_points, s.seed, s.threads, progress)
+        shares = monitor.verified_shares(learner.surrogate, s.design_space, s.goal)
+        rounds.append(Round(learner.labels, shares))
+        watch.lap("monitor")
+        if s.goal.reached(shares):
+            break
+    return learner, rounds
+
+
+def _fitted(
+    learner: ActiveLearner, s: TrainingSettings, settings: FitSettings, progress: Progress, stage: str
+) -> Surrogate:
+    cases, kappa = learner.labelled
+    return fit(
+        cases,
+        kappa,
+        settings,
+        seed=s.seed,
+        space=s.design_space,
+        start=learner.surrogate if settings.epochs == s.round_epochs else None,
+        progress=lambda epoch, of, loss: progress(stage, epoch, of, f"loss {loss:.4f}"),
     )
-    provenance = {
+
+
+def _provenance(s: TrainingSettings, labels: int, rounds: list[Round]) -> dict[str, Any]:
+    return {
         "design_space": s.design_space.to_dict(),
-        "sampling": "scrambled Sobol",
-        "designs": s.designs,
-        "speeds_each": s.speeds_each,
+        "sampling": "scrambled Sobol, then by risk",
+        "first_cases": s.first_cases,
+        "labels": labels,
+        "rounds": [{"labels": r.labels, "verified_share": r.verified_share} for r in rounds],
         "seed": s.seed,
-        "labels": "closed-form first crossing, proven by root count",
-        "kappa_max": KAPPA_MAX,
+        "labelled_by": "in permanent contact closed form, proven by root count; with arcs by verdicts",
         "code_version": __version__,
     }
-    return Dataset(cases, kappa, provenance)
+
+
+@contextmanager
+def _torch_threads(count: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+class _Watch:
+    """Seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._clock = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.seconds[stage] = round(self.seconds.get(stage, 0.0) + now - self._clock, 1)
+        self._clock = now

@@ -10,6 +10,8 @@ import numpy as np
 from sdm_core.blade import Blade, ModalState
 from sdm_core.contact import ContactConfiguration
 from training.cases import CaseBatch
+from training.contact_class import PERMANENT
+from training.space_filling import random_arcs
 
 NAME = "reference/1"
 
@@ -28,6 +30,8 @@ class ReferencePoint:
         Shape (r,).
     speed_hz, ke
         Hz, N/m.
+    arcs
+        Arcs of contact in revolutions, shape (a, 2); None is permanent contact.
     """
 
     frequency_hz: np.ndarray
@@ -36,12 +40,14 @@ class ReferencePoint:
     weights: np.ndarray
     speed_hz: float
     ke: float
+    arcs: np.ndarray | None = None
 
     def case(self) -> CaseBatch:
         """As the surrogate sees it."""
         shape = np.sqrt(self.weights)[:, None] * self.mode_shape.T
         omega = 2 * np.pi * self.frequency_hz
-        return CaseBatch.from_arrays(omega[None], self.damping_ratio, shape[None], np.array([self.speed_hz]))
+        speed, arcs = np.array([self.speed_hz]), None if self.arcs is None else self.arcs[None]
+        return CaseBatch.from_arrays(omega[None], self.damping_ratio, shape[None], speed, arcs)
 
     def blade(self) -> Blade:
         """As a user would send it."""
@@ -50,8 +56,9 @@ class ReferencePoint:
         return Blade("reference", nodes, self.damping_ratio, [state])
 
     def contact(self) -> ContactConfiguration:
-        """Permanent contact with the weights."""
-        return ContactConfiguration({f"N{i + 1}": float(w) for i, w in enumerate(self.weights)})
+        """Contact with the weights and arcs."""
+        weights = {f"N{i + 1}": float(w) for i, w in enumerate(self.weights)}
+        return ContactConfiguration(weights, None if self.arcs is None else self.arcs.tolist())
 
 
 @dataclass(frozen=True)
@@ -62,22 +69,22 @@ class ReferenceSample:
     ke: np.ndarray
 
 
-def reference_sample(count: int, seed: int) -> ReferenceSample:
-    """`count` independent points of the reference design space in permanent contact."""
-    points = list(reference_points(count, seed))
+def reference_sample(count: int, seed: int, contact: str = PERMANENT) -> ReferenceSample:
+    """`count` independent points of the reference design space in one class of contact."""
+    points = list(reference_points(count, seed, contact))
     return ReferenceSample(
         CaseBatch.concatenate([p.case() for p in points]), np.array([p.ke for p in points])
     )
 
 
-def reference_points(count: int, seed: int) -> Iterator[ReferencePoint]:
+def reference_points(count: int, seed: int, contact: str = PERMANENT) -> Iterator[ReferencePoint]:
     """The same points one by one, as blades."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        yield _draw(rng)
+        yield _draw(rng, contact)
 
 
-def _draw(rng: np.random.Generator) -> ReferencePoint:
+def _draw(rng: np.random.Generator, contact: str) -> ReferencePoint:
     n = int(rng.integers(1, 6))
     ratio = np.ones(n)
     ratio[1:2] = rng.uniform(1.8, 4.5, len(ratio[1:2]))
@@ -96,4 +103,9 @@ def _draw(rng: np.random.Generator) -> ReferencePoint:
     kappa = np.exp(rng.uniform(np.log(1e-4), 0.0))
     speed = frequency[0] * np.exp(rng.uniform(np.log(0.05), np.log(0.8)))
     compliance = (shape**2 @ weights) / (2 * np.pi * frequency) ** 2
-    return ReferencePoint(frequency, damping, shape, weights, float(speed), float(kappa / compliance.max()))
+    arcs = None
+    if contact != PERMANENT:
+        count = int(rng.integers(1, 5))
+        arcs = random_arcs(rng, count, rng.uniform(0.05, 0.8), evenness=2.0)[:count]
+    ke = float(kappa / compliance.max())
+    return ReferencePoint(frequency, damping, shape, weights, float(speed), ke, arcs)

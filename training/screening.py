@@ -118,9 +118,7 @@ class Screener:
         else:
             probability = predicted.unstable_probability(stiffness)
             stable = (probability < 0.5).astype(float)
-            if policy == "auto":
-                near = band.verify(predicted, stiffness)
-                reason[(reason == CONFIDENT) & near] = NEAR_BOUNDARY
+            self._mark(reason, predicted, stiffness, band, policy)
         exact = self._exact_rows(reason, policy)
         self._allow(exact.sum(), _POINT_S, blade, speed)
         columns = np.full((6, len(speed)), np.nan)
@@ -178,11 +176,19 @@ class Screener:
                 critical = np.where(predicted.log_ke <= np.log10(ke_max), 10.0**predicted.log_ke, np.nan)
             width = band.half_width(predicted)
             error = 10.0 ** (band.spreads * predicted.spread) - 1
+            # Up to where crossings were looked for, it says there is none.
+            reach = np.broadcast_to(predicted.log_reach, len(speed))
+            top = np.minimum(np.log10(ke_max), reach)
+            beyond = (predicted.log_ke > top) & (reach < np.log10(ke_max))
             if policy == "auto":
                 doubtful = width > _SURE_BOUNDARY
-                doubtful &= predicted.log_ke - width < np.log10(ke_max)  # else none below, for sure
-                doubtful |= np.abs(predicted.log_ke - np.log10(ke_max)) < width
+                doubtful &= predicted.log_ke - width < top  # else none below, for sure
+                doubtful |= np.abs(predicted.log_ke - top) < width
                 reason[(reason == CONFIDENT) & doubtful] = NEAR_BOUNDARY
+                reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
+            elif beyond.any():
+                worst = int(np.argmax(beyond))
+                raise InvalidInput("ke_max", ke_max, _beyond(reach[worst], speed[worst]))
         exact = self._exact_rows(reason, policy)
         unstable: list[tuple[tuple[float, float], ...] | None] = [None] * len(speed)
         if exact.any():
@@ -228,8 +234,7 @@ class Screener:
             column = stiffness[:, None]
             probability = predicted.unstable_probability(column)
             stable = (probability < 0.5).astype(float)
-            if policy == "auto":
-                reason[(reason == CONFIDENT) & band.verify(predicted, column)] = NEAR_BOUNDARY
+            self._mark(reason, predicted, column, band, policy)
         exact = self._exact_rows(reason, policy)
         if contact.permanent:  # one solve decides a whole column
             self._allow(exact.any(axis=0).sum(), _PERMANENT_S, blade, speed)
@@ -292,7 +297,7 @@ class Screener:
         cases = CaseBatch.from_blade(blade, contact, speed)
         why = self.model.design_space.first_violation(cases)
         if self._certificate(contact) is None:
-            why[why == ""] = f"{in_words(contact_class(contact))}, which this model does not cover"
+            why[why == ""] = f"{in_words(contact_class(contact))}, which this model is not certified for"
         outside = why != ""
         if policy == "surrogate" and outside.any():
             i = int(np.argmax(outside))
@@ -303,9 +308,33 @@ class Screener:
         if outside.all():
             return None, reason
         predicted = self.model.surrogate.boundary(cases[~outside])
-        log_ke, spread = np.full(len(speed), np.nan), np.full(len(speed), np.nan)
-        log_ke[~outside], spread[~outside] = predicted.log_ke, predicted.spread
-        return PredictedBoundary(log_ke, spread), reason
+        columns = np.full((3, len(speed)), np.nan)
+        columns[:, ~outside] = (
+            predicted.log_ke,
+            predicted.spread,
+            np.log10(self.model.design_space.largest_ke(cases[~outside])),
+        )
+        return PredictedBoundary(*columns), reason
+
+    def _mark(
+        self,
+        reason: np.ndarray,
+        predicted: PredictedBoundary,
+        ke: np.ndarray,
+        band: VerificationBand,
+        policy: str,
+    ) -> None:
+        """Write into `reason` which points the surrogate is not sure of, or knows nothing of."""
+        with np.errstate(divide="ignore"):
+            beyond = np.log10(ke) > predicted.log_reach
+        if policy == "auto":
+            reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
+            reason[(reason == CONFIDENT) & band.verify(predicted, ke)] = NEAR_BOUNDARY
+        elif beyond.any():
+            at = tuple(np.argwhere(beyond)[0])
+            worst = float(np.broadcast_to(ke, beyond.shape)[at])
+            reach = float(np.broadcast_to(predicted.log_reach, beyond.shape)[at])
+            raise InvalidInput("ke", worst, _beyond(reach))
 
     def _exact_rows(self, reason: np.ndarray, policy: str) -> np.ndarray:
         if policy == "surrogate":
@@ -322,6 +351,11 @@ class Screener:
         if count > most:
             many = f"ask for at most {most} of them in one call" if most else "leave out the highest modes"
             raise TooMuchWork("speed_hz", f"{count} answers by the exact core", many)
+
+
+def _beyond(log_reach: float, speed_hz: float | None = None) -> str:
+    at = "" if speed_hz is None else f" at {speed_hz:g} Hz"
+    return f"the surrogate knows this blade up to {10.0**log_reach:.3g} N/m{at}; use policy auto or exact"
 
 
 def _source(exact: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from training.cases import CaseBatch
-from training.features import Features, feature_count, features
+from training.features import CaseTensors, Features, feature_count, features
 
 _BATCH = 16_384
 
@@ -42,10 +42,13 @@ class PredictedBoundary:
         log10 of the critical K_e in N/m, shape (m,).
     spread
         Scale s of the logistic distribution of log10 K_e, shape (m,).
+    log_reach
+        log10 of the K_e up to which the design space goes, N/m, shape (m,); infinite where not said.
     """
 
     log_ke: np.ndarray
     spread: np.ndarray
+    log_reach: np.ndarray | float = np.inf
 
     def unstable_probability(self, ke: np.ndarray) -> np.ndarray:
         """P(unstable) = logistic((log10 K_e − log10 K_critical)/s), shape (m,)."""
@@ -107,7 +110,7 @@ class Surrogate:
         log_kappa, spread = [], []
         with torch.inference_mode():
             for i in range(0, len(cases), _BATCH):
-                found = features(cases[i : i + _BATCH])
+                found = features(CaseTensors.of(cases[i : i + _BATCH]))
                 middle, log_spread = self._evaluate(found)
                 log_kappa.append(middle.numpy())
                 spread.append(torch.exp(log_spread).double().numpy())

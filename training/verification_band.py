@@ -8,8 +8,7 @@ import numpy as np
 
 from training.surrogate import PredictedBoundary
 
-# A verdict within 5 % of the boundary is verified however sure the surrogate is.
-LEAST_HALF_WIDTH = float(np.log10(1.05))
+FIVE_PERCENT, ONE_PERCENT = float(np.log10(1.05)), float(np.log10(1.01))
 
 
 @dataclass(frozen=True)
@@ -19,10 +18,13 @@ class VerificationBand:
     Attributes
     ----------
     spreads
-        Half width of the band in learned spreads; in K_e it is 5 % at least.
+        Half width of the band in learned spreads.
+    least_half_width
+        In log10 K_e: a verdict as near as this is verified however sure the surrogate is.
     """
 
     spreads: float
+    least_half_width: float = FIVE_PERCENT
 
     def verify(self, boundary: PredictedBoundary, ke: np.ndarray) -> np.ndarray:
         """Which points must be verified, shape (m,)."""
@@ -32,4 +34,4 @@ class VerificationBand:
 
     def half_width(self, boundary: PredictedBoundary) -> np.ndarray:
         """Half width of the band in log10 K_e, shape (m,)."""
-        return np.maximum(self.spreads * boundary.spread, LEAST_HALF_WIDTH)
+        return np.maximum(self.spreads * boundary.spread, self.least_half_width)

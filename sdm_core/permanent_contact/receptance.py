@@ -11,6 +11,7 @@ from sdm_core.interruption import checkpoint
 
 _AT_ONCE = 40_000  # numbers a mode-by-frequency table may hold, so that it stays in the cache
 _MOST_INTERVALS = 200_000
+_OFF = (1e-14, 1e-12, 1e-10)  # how far beside an eigenvalue H is inverted, of the size of H
 
 
 @dataclass(frozen=True)
@@ -200,13 +201,27 @@ class ContactReceptance:
         """
         h = self._modal(w, sets)
         matrix = self._matrix(h, sets)
-        # Where λ is right already H − λI is singular; so far off, the step still restores it. The second
-        # part keeps it off where λ is so much smaller than H that the first is lost in rounding.
-        start = (1.0 / guess) * (1 + 1e-11j) + 1e-14j * np.abs(matrix).max(axis=(1, 2))
-        inverse = np.linalg.inv(matrix - start[:, None, None] * np.eye(self.rank))
+        start, inverse = _inverse_beside(matrix, 1.0 / guess)
         trace = np.trace(inverse, axis1=1, axis2=2)
         slope = self._matrix(self._modal_slope(h, w, sets), sets)
         return start + trace / (inverse**2).sum(axis=(1, 2)), (inverse * slope).sum(axis=(1, 2)) / trace
+
+
+def _inverse_beside(matrix: np.ndarray, eigenvalue: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A value next to each eigenvalue, and (H − value·I)⁻¹; from shapes (k, p, p) and (k,).
+
+    Where the eigenvalue is right already H − λI is singular; so far off, a step by its inverse still
+    restores it. The second part keeps it off where λ is so much smaller than H that the first is lost in
+    rounding, and is raised where elimination meets an exact zero all the same (H of nearly rank one).
+    """
+    size = np.abs(matrix).max(axis=(1, 2))
+    for off in _OFF:
+        value = eigenvalue * (1 + 1e-11j) + 1j * off * size
+        try:
+            return value, np.linalg.inv(matrix - value[:, None, None] * np.eye(matrix.shape[1]))
+        except np.linalg.LinAlgError:
+            continue
+    raise np.linalg.LinAlgError(f"H is singular beside its eigenvalue, by {_OFF[-1]:g} of its size")
 
 
 @dataclass(frozen=True)

@@ -135,13 +135,15 @@ def _of_service(url: str) -> list[dict[str, Any]]:
 
 def _figures(card: dict[str, Any]) -> tuple[str, str, str, str]:
     """What a card says of itself; a card of another age may say less."""
-    dataset, evaluation = card.get("dataset", {}), card.get("evaluation", {})
-    size = f"{dataset['designs']:,} blades" if "designs" in dataset else "-"
-    error = f"{evaluation['median_boundary_error']:.2%}" if "median_boundary_error" in evaluation else "-"
-    auto = evaluation.get("auto", {})
-    wrong = f"{auto['false_stable']} of {auto['answered_stable']:,}" if "false_stable" in auto else "-"
+    size = f"{card['dataset']['labels']:,} cases" if "labels" in card.get("dataset", {}) else "-"
+    errors, wrongs = [], []
+    for found in card.get("evaluation", {}).values():
+        if "median_boundary_error" in found:
+            errors.append(f"{found['median_boundary_error']:.2%}")
+        if "false_stable" in found.get("auto", {}):
+            wrongs.append(f"{found['auto']['false_stable']} of {found['auto']['answered_stable']:,}")
     certified = []
     for found in card.get("certificates", ()):
         rates = ", ".join(f"{line['alpha']:g}" for line in found["table"])
         certified.append(f"{found['contact']}: {rates}")
-    return size, error, wrong, "; ".join(certified) or "-"
+    return size, ", ".join(errors) or "-", ", ".join(wrongs) or "-", "; ".join(certified) or "-"

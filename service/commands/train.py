@@ -24,19 +24,26 @@ def run(
     ] = "out/models",
     seed: Annotated[int, typer.Option(help="Of everything drawn by chance.", min=0)] = 2013,
     threads: Annotated[int, typer.Option(help="Labelling processes and torch threads.", min=1)] = 2,
-    designs: Annotated[
-        int, typer.Option(help="Blades in the training set.", min=64, rich_help_panel=SIZE)
-    ] = 32_768,
-    speeds_each: Annotated[
-        int, typer.Option(help="Rotor speeds of each blade.", min=1, rich_help_panel=SIZE)
-    ] = 6,
+    device: Annotated[str, typer.Option(help="Where torch fits: auto, cpu or cuda.")] = "auto",
+    cases: Annotated[
+        int, typer.Option(help="Cases labelled before the first fit.", min=2048, rich_help_panel=SIZE)
+    ] = 98_304,
+    cases_each: Annotated[
+        int, typer.Option(help="Cases labelled in each round of asking.", min=1024, rich_help_panel=SIZE)
+    ] = 65_536,
+    rounds: Annotated[
+        int,
+        typer.Option(
+            help="Most rounds of asking; they end when the goal is certified.", min=0, rich_help_panel=SIZE
+        ),
+    ] = 4,
     epochs: Annotated[
         int, typer.Option(help="Passes over the training set.", min=1, rich_help_panel=SIZE)
     ] = 40,
     points: Annotated[
         int,
         typer.Option(
-            help="Independent points of the certificate; 1e-4 takes 92,000 at least.",
+            help="Independent points of the certificate, each class of contact; 1e-4 takes 92,000.",
             min=20_000,
             rich_help_panel=SIZE,
         ),
@@ -56,25 +63,27 @@ def run(
         ),
     ] = None,
 ) -> None:
-    """Sample the design space, label it with the exact core, fit, calibrate and evaluate a surrogate.
+    """Label cases with the exact core, fit, ask where it is unsure, calibrate and evaluate a surrogate.
 
     Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
     """
     from service.commands.models import certificate_table
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
     from training.certificate import CalibrationFailed
+    from training.contact_class import in_words
     from training.fit import FitSettings
     from training.pipeline import TrainingSettings, train
 
     check_writable(json=json, folder=f"{folder}/active")
     settings = TrainingSettings(
-        designs=designs,
-        speeds_each=speeds_each,
+        first_cases=cases,
+        cases_each=cases_each,
+        rounds=rounds,
         calibration_points=points,
         evaluation_points=evaluation_points,
         seed=seed,
         threads=threads,
-        fit=FitSettings(epochs=epochs),
+        fit=FitSettings(epochs=epochs, device=device),
     )
     console = console_beside(json)
     try:
@@ -87,28 +96,34 @@ def run(
             )
     except CalibrationFailed as error:
         typer.echo(
-            f"rubscreen: no model was written: {error}. Give it more designs, epochs or points", err=True
+            f"rubscreen: no model was written: {error}. Give it more cases, rounds, epochs or points",
+            err=True,
         )
         raise typer.Exit(1) from None
     for certificate in made.model.certificates:
         console.print(certificate_table(certificate))
-    console.print(_figures(made.evaluation))
-    console.print(
-        f"boundary error: median {made.evaluation.median_boundary_error:.2%}, "
-        f"99 of 100 below {made.evaluation.p99_boundary_error:.2%}"
-    )
+    for contact, evaluation in made.evaluations.items():
+        console.print(_figures(evaluation, in_words(contact)))
+        console.print(
+            f"boundary error: median {evaluation.median_boundary_error:.2%}, "
+            f"99 of 100 below {evaluation.p99_boundary_error:.2%}"
+        )
+    for one in made.rounds:
+        shares = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in one.verified_share.items())
+        console.print(f"[dim]{one.labels:,} labels: to verify for the goal {shares}[/dim]")
     console.print(f"[dim]seconds: {', '.join(f'{k} {v:g}' for k, v in made.seconds.items())}[/dim]")
     console.print(f"model {made.model.id} in {folder}{', now active' if activate else ''}")
     if json:
-        report = {"model": made.model.id, "seconds": made.seconds, "evaluation": made.evaluation.to_dict()}
+        evaluations = {contact: found.to_dict() for contact, found in made.evaluations.items()}
+        report = {"model": made.model.id, "seconds": made.seconds, "evaluation": evaluations}
         write_json(json, report, indent=True)
 
 
-def _figures(evaluation: Evaluation) -> Table:
+def _figures(evaluation: Evaluation, contact: str) -> Table:
     from rich.table import Table
 
     table = Table(
-        title=f"On an independent sample of {evaluation.distribution}",
+        title=f"On an independent sample of {evaluation.distribution}, {contact}",
         title_justify="left",
         title_style="bold",
     )

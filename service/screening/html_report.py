@@ -18,6 +18,7 @@ from service.screening.html_page import Markup, element, page, table
 from service.screening.html_ranking import NOT_SCREENED, count, ranking, set_ke, summary, verdict
 from service.screening.screen import ScreeningResult
 from training.answers import CertificateUsed
+from training.contact_class import in_words
 
 _TITLE = "Screening for rub-induced instability"
 # On a sheet; report.json has all that were found.
@@ -59,15 +60,16 @@ def certificate(card: Mapping[str, Any], policy: str, used: CertificateUsed | No
     A card of another age may say less.
     """
     said = []
-    evaluation = card.get("evaluation", {})
-    found = evaluation.get("alone" if policy == "surrogate" else "auto", {})
-    if "false_stable" in found:
-        said.append(
-            f"on {found['points']:,} independent points of {evaluation.get('distribution', 'its domain')}, "
-            f"{found['false_stable']} of {found['answered_stable']:,} answers “stable” were wrong and "
-            f"{found['false_unstable']} of {found['answered_unstable']:,} “unstable”, "
-            f"{found['exact_share']:.1%} being verified by the exact core"
-        )
+    for contact, evaluation in card.get("evaluation", {}).items():
+        found = evaluation.get("alone" if policy == "surrogate" else "auto", {})
+        if "false_stable" in found:
+            said.append(
+                f"in {in_words(contact)}, on {found['points']:,} independent points of "
+                f"{evaluation.get('distribution', 'its domain')}, "
+                f"{found['false_stable']} of {found['answered_stable']:,} answers “stable” were wrong and "
+                f"{found['false_unstable']} of {found['answered_unstable']:,} “unstable”, "
+                f"{found['exact_share']:.1%} being verified by the exact core"
+            )
     if used is not None:
         said.append(
             f"the share of unstable designs among those called stable is below {used.alpha:g} "

@@ -14,6 +14,7 @@ from sdm_core.errors import Cancelled, TooMuchWork
 from sdm_core.interruption import interruptible
 from sdm_core.permanent_contact.closed_form import crossings
 from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
+from sdm_core.permanent_contact.receptance import _inverse_beside
 from sdm_core.permanent_contact.root_count import unstable_root_count
 from sdm_core.rubbing_blade import RubbingBlade, single_state_problem
 
@@ -265,3 +266,10 @@ def test_memory_does_not_grow_with_the_number_of_cases():
 
     few, many = peak(500), peak(5000)
     assert many < few + 20
+
+
+def test_an_eigenvalue_that_elimination_meets_exactly_is_stepped_around():
+    met = 1.0 * (1 + 1e-11j) + 1j * 1e-14 * 3.0  # where H is inverted first
+    value, inverse = _inverse_beside(np.diag([met, 3.0])[None], np.array([1.0]))
+    trace = np.trace(inverse[0])
+    assert value[0] + trace / (inverse[0] ** 2).sum() == pytest.approx(met, rel=1e-13)

@@ -21,7 +21,7 @@ from service.app import create_app
 from service.client import Client
 from service.rest.question_schemas import POINTS_EXAMPLE
 from service.settings import Settings
-from training.certificate import BANDS, Certificate, CertifiedBand
+from training.certificate import Certificate, CertifiedBand
 from training.contact_class import PERMANENT
 from training.design_space import DesignSpace
 from training.registry import write_model
@@ -39,7 +39,7 @@ def untrained(folder: Path) -> str:
     architecture = Architecture(width=8, blocks=1)
     surrogate = Surrogate(BoundaryNetwork(architecture), architecture)
     lines = tuple(CertifiedBand(alpha, 1e6, 0, 0, 1.0, 0.0) for alpha in (1e-2, 5e-4))
-    certificate = Certificate("none: untrained", PERMANENT, 0.5, 0, 0, lines, BANDS)
+    certificate = Certificate("none: untrained", PERMANENT, 0.5, 0, 0, lines, (1e6,))
     return write_model(surrogate, DesignSpace(), [certificate], {"trained_on": "nothing"}, folder).id
 
 

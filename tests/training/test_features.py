@@ -8,18 +8,28 @@ from named_problems import AT_TIP, one_mode
 from sdm_core.boundary import boundary
 from training.cases import MODES, CaseBatch
 from training.features import (
+    HARMONICS,
     MODE_FEATURES,
     PHASE_FEATURES,
+    CaseTensors,
+    engagement,
     feature_count,
     feature_names,
-    features,
     single_mode_lobes,
 )
+from training.features import features as features_of
 from training.reference_space import reference_sample
 
 
-def case(omega, damping, shape, speed) -> CaseBatch:
-    return CaseBatch.from_arrays(np.array([omega]), np.array(damping), np.array([shape]), np.array([speed]))
+def features(cases: CaseBatch):
+    return features_of(CaseTensors.of(cases))
+
+
+def case(omega, damping, shape, speed, arcs=None) -> CaseBatch:
+    engaged = None if arcs is None else arcs[None]
+    return CaseBatch.from_arrays(
+        np.array([omega]), np.array(damping), np.array([shape]), np.array([speed]), engaged
+    )
 
 
 @pytest.fixture
@@ -61,6 +71,33 @@ def test_features_do_not_depend_on_signs_orders_nodes_or_units(random_case):
         found = features(variant)
         torch.testing.assert_close(found.inputs, reference.inputs, rtol=1e-5, atol=1e-5, msg=name)
         torch.testing.assert_close(found.baseline, reference.baseline, rtol=1e-9, atol=1e-9)
+
+
+def test_features_do_not_depend_on_where_round_the_casing_counting_starts(random_case):
+    omega, damping, shape, speed = random_case
+    arcs = np.array([[0.05, 0.3], [0.5, 0.6], [0.7, 0.95]])
+    turned = np.array([[0.0, 0.15], [0.25, 0.5], [0.7, 0.8], [0.9, 1.0]])  # by 0.2, across the start
+    found = [features(case(omega, damping, shape, speed, a)) for a in (arcs, turned)]
+    torch.testing.assert_close(found[0].inputs, found[1].inputs, rtol=1e-5, atol=1e-5)
+
+
+def test_engagement_is_its_mean_and_the_moduli_of_its_harmonics():
+    arcs = np.array([[0.1, 0.35], [0.5, 0.9]])
+    theta = (np.arange(1_000_000) + 0.5) / 1e6
+    gamma = sum(((a <= theta) & (theta < b)).astype(float) for a, b in arcs)
+    exact = np.abs(np.fft.rfft(gamma)[1 : HARMONICS + 1]) / len(gamma)
+    share, harmonics = engagement(torch.tensor(arcs)[None])
+    assert share.item() == pytest.approx(0.65)
+    np.testing.assert_allclose(harmonics[0].numpy(), exact, atol=3e-6)
+    _, none = engagement(torch.tensor([[[0.0, 1.0]]], dtype=torch.float64))
+    assert none.abs().max() < 1e-9
+
+
+def test_arcs_all_round_are_permanent_contact(random_case):
+    omega, damping, shape, speed = random_case
+    whole = features(case(omega, damping, shape, speed))
+    parts = features(case(omega, damping, shape, speed, np.array([[0.0, 0.4], [0.4, 1.0]])))
+    torch.testing.assert_close(parts.inputs, whole.inputs, rtol=1e-5, atol=1e-5)
 
 
 def test_a_mode_that_the_contact_cannot_reach_changes_nothing(random_case):

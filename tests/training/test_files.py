@@ -1,6 +1,7 @@
 """Datasets and model files: whole, unaltered, or refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from training.contact_class import ARCS, PERMANENT
 from training.dataset import Dataset
 from training.design_space import DesignSpace
 from training.registry import active_id, list_models, load_model, write_model
+from training.space_filling import space_filling
 from training.surrogate import Architecture, BoundaryNetwork, Surrogate
 
 LINE = CertifiedBand(5e-4, 9.0, 10_000, 0, 0.02, 1e-4)
@@ -24,7 +26,7 @@ CERTIFICATES = [
 
 @pytest.fixture
 def dataset():
-    cases = DesignSpace().sample(4, 2, seed=1)
+    cases = space_filling(DesignSpace(), 4, 2, seed=1, contact=ARCS)
     return Dataset(cases, np.linspace(0.1, 0.8, len(cases)), {"seed": 1})
 
 
@@ -68,7 +70,7 @@ def test_a_model_reads_back_with_the_same_answers(models):
     folder, model = models
     again = load_model(folder=folder)
     assert again.id == model.id == active_id(folder)
-    cases = DesignSpace().sample(3, 2, seed=2)
+    cases = space_filling(DesignSpace(), 3, 2, seed=2)
     ours, theirs = model.surrogate.boundary(cases), again.surrogate.boundary(cases)
     np.testing.assert_array_equal(ours.log_ke, theirs.log_ke)
     assert list(again.certificates) == CERTIFICATES
@@ -123,15 +125,14 @@ def test_a_folder_without_models_says_to_train(tmp_path):
 
 def test_membership_of_the_design_space_names_the_reason():
     space = DesignSpace()
-    good = space.sample(64, 2, seed=3)
+    good = space_filling(space, 64, 2, seed=3)
     assert space.contains(good).mean() > 0.9
 
     def with_changes(**changes) -> CaseBatch:
-        names = ("omega", "damping_ratio", "contact_matrix", "speed_hz", "mode_count")
-        return CaseBatch(*(changes.get(n, getattr(good, n)) for n in names))
+        return replace(good, **changes)
 
     slow = space.first_violation(with_changes(speed_hz=good.speed_hz * 0.01))
-    assert set(slow) == {"speed/f1 outside 0.045 to 0.85"}
+    assert set(slow) == {"speed/f1 outside 0.045 to 0.9"}
     damped = space.first_violation(with_changes(damping_ratio=np.full_like(good.omega, 0.1)))
     assert set(damped) == {"damping_ratio outside 0.00012 to 0.017"}
     undamped = space.contains(with_changes(damping_ratio=np.zeros_like(good.omega)))
@@ -141,4 +142,20 @@ def test_membership_of_the_design_space_names_the_reason():
     many = space.first_violation(with_changes(mode_count=np.full(len(good), 6)))
     assert set(many) == {"more than 5 modes"}
     with pytest.raises(InvalidInput):
-        space.sample(0, 1, seed=1)
+        space_filling(space, 0, 1, seed=1)
+
+
+def test_membership_looks_at_the_arcs_of_contact_and_at_stiffness():
+    space = DesignSpace()
+    good = space_filling(space, 64, 2, seed=3, contact=ARCS)
+    assert space.contains(good).mean() > 0.9 and not good.permanent.any()
+    rare = replace(good, arcs=good.arcs * 1e-3)
+    assert set(space.first_violation(rare)) == {"share of the revolution in contact outside 0.03 to 0.95"}
+    assert set(space.first_violation(replace(good, arc_count=np.full(len(good), 5)))) == {
+        "more than 4 arcs of contact"
+    }
+    smooth = replace(good, arcs=np.full_like(good.arcs, np.nan), arc_count=np.zeros(len(good), int))
+    assert set(space.first_violation(smooth)) == {"smooth engagement, which this model does not cover"}
+    stiff = np.where(np.arange(len(good)) % 2 == 0, 1.01, 0.99) * space.largest_ke(good)
+    odd = np.arange(len(good)) % 2 == 1
+    np.testing.assert_array_equal(space.contains(good, stiff), space.contains(good) & odd)

@@ -11,6 +11,7 @@ from training.features import MODE_FEATURES, PHASE_FEATURES, Features, features
 from training.fit import FitSettings, boundary_loss, fit
 from training.labelling import critical_kappa
 from training.reference_space import reference_sample
+from training.space_filling import space_filling
 from training.surrogate import Architecture, PredictedBoundary
 from training.verification_band import VerificationBand
 
@@ -19,7 +20,7 @@ SMALL = FitSettings(architecture=Architecture(width=48, blocks=2), epochs=25, ba
 
 @pytest.fixture(scope="module")
 def labelled():
-    cases = DesignSpace().sample(600, 3, seed=5)
+    cases = space_filling(DesignSpace(), 600, 3, seed=5)
     return cases, critical_kappa(cases, workers=1)
 
 
@@ -40,7 +41,7 @@ def without_phases(cases) -> Features:
     found = features(cases)
     blind = [i for i, name in enumerate(MODE_FEATURES) if name in PHASE_FEATURES]
     inputs = found.inputs.clone()
-    by_mode = inputs[:, : 5 * len(MODE_FEATURES)].view(len(cases), len(MODE_FEATURES), 5)
+    by_mode = inputs[:, : 5 * len(MODE_FEATURES)].view(len(inputs), len(MODE_FEATURES), 5)
     by_mode[:, blind] = 0.0
     return Features(inputs, torch.zeros_like(found.baseline))
 
@@ -75,7 +76,8 @@ def test_unstable_probability_rises_with_stiffness_and_is_one_half_at_the_bounda
 
 def test_loss_of_a_censored_case_falls_as_the_boundary_moves_beyond_reach():
     spread, none = torch.tensor([-2.0]), torch.tensor([float("inf")])
-    losses = [boundary_loss(torch.tensor([m]), spread, none).item() for m in (0.0, 1.0, 2.0)]
+    reach = torch.tensor([0.6])
+    losses = [boundary_loss(torch.tensor([m]), spread, none, reach).item() for m in (0.0, 1.0, 2.0)]
     assert losses[0] > losses[1] > losses[2] >= 0
 
 
