@@ -17,6 +17,10 @@ MEASUREMENTS = {
     "rotor37": "benchmarks.rotor_37_blade",
     "accuracy": "benchmarks.screening_accuracy",
     "certificate": "benchmarks.certificate",
+    "blades": "benchmarks.real_blades",
+    "architectures": "benchmarks.architectures",
+    "surrogate_speed": "benchmarks.surrogate_speed",
+    "learning": "benchmarks.learning_curve",
     "speed": "benchmarks.map_speed",
 }
 

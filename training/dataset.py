@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.version import __version__
 from training.cases import CaseBatch
 
 FORMAT = "rubscreen/dataset/2"
@@ -50,8 +52,13 @@ class Dataset:
 
     def write(self, folder: Path) -> Path:
         """Write to `folder` under its digest; a dataset already there is left untouched."""
-        folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"dataset-{self.digest[:16]}.npz"
+        self.write_to(path)
+        return path
+
+    def write_to(self, path: Path) -> None:
+        """Write under a name of one's own, whole or not at all; a file already there is left untouched."""
+        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists():
             buffer = io.BytesIO()
             header = json.dumps({"format": FORMAT, "digest": self.digest, "provenance": self.provenance})
@@ -61,7 +68,6 @@ class Dataset:
             partial.write_bytes(buffer.getvalue())
             partial.replace(path)
             path.chmod(0o444)
-        return path
 
     @classmethod
     def read(cls, path: Path) -> Dataset:
@@ -89,3 +95,21 @@ class Dataset:
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return {**{name: getattr(self.cases, name) for name in _ARRAYS}, "kappa": self.kappa}
+
+
+def kept_labels(cases: CaseBatch, folder: Path, label: Callable[[], np.ndarray]) -> np.ndarray:
+    """κ of cases labelled before in this folder, else what `label` gives, kept for the next time.
+
+    Labels are named after the cases and the version of the code, and no others are taken for them. Those that
+    cannot be read are made again.
+    """
+    asked = Dataset(cases, np.zeros(0), {"labels of": FORMAT, "code_version": __version__})
+    path = folder / f"labels-{asked.digest[:16]}.npz"
+    if path.is_file():
+        try:
+            return Dataset.read(path).kappa
+        except DamagedFile:
+            path.unlink(missing_ok=True)
+    found = Dataset(cases, label(), asked.provenance)
+    found.write_to(path)
+    return found.kappa

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ import torch
 from sdm_core.version import __version__
 from training.active_learning import ActiveLearner
 from training.calibration import CLASSES, CalibrationSettings, Progress, calibrated
-from training.dataset import Dataset
+from training.contact_class import in_words
+from training.dataset import Dataset, kept_labels
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
@@ -43,15 +45,16 @@ class TrainingSettings:
     seed
         Of everything; calibration, evaluation and monitoring each have a seed of their own derived from it.
     threads
-        Torch threads and labelling processes. With seed, thread count, device and machine the same, so are
-        the figures.
+        Labelling processes. Torch fits on one thread: batches as small as these gain next to nothing from
+        more, and lose much where another program wants the cores. With seed, device and machine the same, so
+        are the figures.
     fit
         The last fit.
     """
 
     first_cases: int = 98_304
-    cases_each: int = 65_536
-    rounds: int = 4
+    cases_each: int = 49_152
+    rounds: int = 3
     round_epochs: int = 8
     goal: Goal | None = field(default_factory=Goal)
     calibration_points: int = 200_000
@@ -103,7 +106,8 @@ def train(
     models_folder
         Where the model folder goes.
     data_folder
-        Where the labelled dataset goes; by default a ``datasets`` folder beside the models.
+        Where the labelled dataset goes; by default a ``datasets`` folder beside the models. Labels are kept
+        there round by round, so that a training that was killed does not label again.
     activate
         Make it the active model of its folder.
 
@@ -114,11 +118,12 @@ def train(
     """
     s = settings or TrainingSettings()
     watch = _Watch()
-    with _torch_threads(s.threads):
-        learner, rounds = _asked(s, watch, progress)
+    data_folder = data_folder or models_folder.parent / "datasets"
+    with _torch_threads(1):
+        learner, rounds = _asked(s, data_folder, watch, progress)
         cases, kappa = learner.labelled
         dataset = Dataset(cases, kappa, _provenance(s, learner.labels, rounds))
-        dataset_path = dataset.write(data_folder or models_folder.parent / "datasets")
+        dataset_path = dataset.write(data_folder)
         surrogate = _fitted(learner, s, s.fit, progress, "fit")
         watch.lap("fit")
 
@@ -140,7 +145,9 @@ def train(
     return TrainingResult(model, calibration.evaluations, dataset_path, tuple(rounds), watch.seconds)
 
 
-def _asked(s: TrainingSettings, watch: _Watch, progress: Progress) -> tuple[ActiveLearner, list[Round]]:
+def _asked(
+    s: TrainingSettings, data_folder: Path, watch: _Watch, progress: Progress
+) -> tuple[ActiveLearner, list[Round]]:
     """Label, fit and ask again, until the goal is certified on the monitoring sample or rounds are over."""
     learner, rounds = ActiveLearner(s.design_space, s.seed), []
     monitor = None
@@ -152,7 +159,11 @@ def _asked(s: TrainingSettings, watch: _Watch, progress: Progress) -> tuple[Acti
         def labelled(done: int, of: int, stage: str = stage) -> None:
             progress(stage, done, of, "exact core")
 
-        kappa = critical_kappa(cases, s.design_space, workers=s.threads, progress=labelled)
+        kappa = kept_labels(
+            cases,
+            data_folder,
+            partial(critical_kappa, cases, s.design_space, workers=s.threads, progress=labelled),
+        )
         learner.tell(cases, kappa)
         watch.lap("label")
         if number == s.rounds:
@@ -165,6 +176,8 @@ def _asked(s: TrainingSettings, watch: _Watch, progress: Progress) -> tuple[Acti
         monitor = monitor or Monitor.drawn(CLASSES, s.monitor_points, s.seed, s.threads, progress)
         shares = monitor.verified_shares(learner.surrogate, s.design_space, s.goal)
         rounds.append(Round(learner.labels, shares))
+        told = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in shares.items())
+        progress("monitor", number + 1, s.rounds + 1, f"to verify for {s.goal.alpha:g}: {told}")
         watch.lap("monitor")
         if s.goal.reached(shares):
             break

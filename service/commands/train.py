@@ -23,20 +23,20 @@ def run(
         typer.Argument(metavar="FOLDER", help="Where models are kept; each gets a folder of its own in it."),
     ] = "out/models",
     seed: Annotated[int, typer.Option(help="Of everything drawn by chance.", min=0)] = 2013,
-    threads: Annotated[int, typer.Option(help="Labelling processes and torch threads.", min=1)] = 2,
+    threads: Annotated[int, typer.Option(help="Labelling processes.", min=1)] = 2,
     device: Annotated[str, typer.Option(help="Where torch fits: auto, cpu or cuda.")] = "auto",
     cases: Annotated[
         int, typer.Option(help="Cases labelled before the first fit.", min=2048, rich_help_panel=SIZE)
     ] = 98_304,
     cases_each: Annotated[
         int, typer.Option(help="Cases labelled in each round of asking.", min=1024, rich_help_panel=SIZE)
-    ] = 65_536,
+    ] = 49_152,
     rounds: Annotated[
         int,
         typer.Option(
             help="Most rounds of asking; they end when the goal is certified.", min=0, rich_help_panel=SIZE
         ),
-    ] = 4,
+    ] = 3,
     epochs: Annotated[
         int, typer.Option(help="Passes over the training set.", min=1, rich_help_panel=SIZE)
     ] = 40,

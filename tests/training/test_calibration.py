@@ -35,10 +35,15 @@ def labels(monkeypatch):
     class Labels:
         factor = 1.0
 
-        def __call__(self, cases, *, workers, progress=None):
+        def kappa(self, cases, *, workers, progress=None):
             return self.factor * 10.0 ** surrogate.boundary(cases).log_ke / cases.stiffness_scale
 
-    monkeypatch.setattr(calibration, "critical_kappa", labels := Labels())
+        def verdicts(self, cases, ke, *, workers, progress=None):
+            return (ke <= self.kappa(cases, workers=1) * cases.stiffness_scale).astype(float)
+
+    labels = Labels()
+    monkeypatch.setattr(calibration, "critical_kappa", labels.kappa)
+    monkeypatch.setattr(calibration, "point_verdicts", labels.verdicts)
     return labels
 
 
@@ -51,11 +56,11 @@ def test_recalibrating_keeps_the_weights_and_leaves_the_old_model_beside_the_new
     kept = ("weights_sha256", "dataset", "fit", "design_space", "seed", "architecture")
     assert {k: again.card[k] for k in kept} == {k: old.card[k] for k in kept}
     assert again.certificates == found.certificates
-    certificate = again.certificate(PERMANENT)
-    assert certificate.points == 16_000 and certificate.seed == seed_for("calibration", 2013)
-    assert certificate.alphas == (1e-2, 5e-3, 1e-3, 5e-4) and certificate.not_reached == (1e-4,)
-    assert again.certificate(ARCS) is None
-    assert again.card["evaluation"]["auto"]["points"] == 500
+    for contact, purpose in ((PERMANENT, "calibration"), (ARCS, "calibration, arcs")):
+        certificate = again.certificate(contact)
+        assert certificate.points == 16_000 and certificate.seed == seed_for(purpose, 2013)
+        assert certificate.alphas == (1e-2, 5e-3, 1e-3, 5e-4) and certificate.not_reached == (1e-4,)
+        assert again.card["evaluation"][contact]["auto"]["points"] == 500
 
 
 def test_the_same_calibration_gives_the_same_model(models, labels):
@@ -105,8 +110,18 @@ def test_training_writes_the_card_that_recalibrating_does(tmp_path, labels, monk
 
     monkeypatch.setattr(pipeline, "calibrated", certified_as_shipped)
     quick = FitSettings(Architecture(width=8, blocks=1), epochs=1, batch=32)
-    settings = TrainingSettings(designs=64, speeds_each=2, seed=11, threads=1, fit=quick)
+    settings = TrainingSettings(
+        first_cases=128,
+        cases_each=64,
+        rounds=2,
+        round_epochs=1,
+        monitor_points=200,
+        seed=11,
+        threads=1,
+        fit=quick,
+    )
     made = train(tmp_path / "models", settings)
+    assert [one.labels for one in made.rounds] == [124, 188]
     again = load_model(folder=tmp_path / "models")
     assert again.id == made.model.id and again.certificates == made.model.certificates
     assert again.card.keys() == shipped.card.keys()

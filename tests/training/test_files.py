@@ -10,7 +10,7 @@ from sdm_core.errors import DamagedFile, InvalidInput
 from training.cases import CaseBatch
 from training.certificate import Certificate, CertifiedBand
 from training.contact_class import ARCS, PERMANENT
-from training.dataset import Dataset
+from training.dataset import Dataset, kept_labels
 from training.design_space import DesignSpace
 from training.registry import active_id, list_models, load_model, write_model
 from training.space_filling import space_filling
@@ -64,6 +64,25 @@ def test_a_dataset_cut_short_is_refused(dataset, tmp_path):
             Dataset.read(path)
     with pytest.raises(InvalidInput):
         Dataset.read(tmp_path / "absent.npz")
+
+
+def test_labels_are_kept_for_a_training_that_was_killed_and_made_again_when_damaged(dataset, tmp_path):
+    asked = []
+
+    def label():
+        asked.append(1)
+        return dataset.kappa
+
+    for _ in range(2):
+        np.testing.assert_array_equal(kept_labels(dataset.cases, tmp_path, label), dataset.kappa)
+    assert len(asked) == 1
+    (kept,) = tmp_path.iterdir()
+    kept.chmod(0o644)
+    kept.write_bytes(kept.read_bytes()[:-9])
+    np.testing.assert_array_equal(kept_labels(dataset.cases, tmp_path, label), dataset.kappa)
+    assert len(asked) == 2
+    kept_labels(dataset.cases[1:], tmp_path, lambda: dataset.kappa[1:])  # others are not taken for these
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_a_model_reads_back_with_the_same_answers(models):

@@ -20,10 +20,11 @@ from training.answers import (
     CertificateUsed,
 )
 from training.cases import CaseBatch
+from training.contact_class import ARCS as WITH_ARCS
 from training.contact_class import PERMANENT
 from training.evaluation import evaluate
 from training.features import MODE_FEATURES, PHASE_FEATURES, features
-from training.labelling import critical_kappa
+from training.labelling import critical_kappa, point_verdicts
 from training.reference_space import NAME, reference_sample
 from training.screening import Screener
 
@@ -66,6 +67,19 @@ def test_the_shipped_model_keeps_its_promises_on_points_it_never_saw(screener, u
     assert found.auto.false_unstable_rate <= 0.01
     assert found.auto.exact_share <= 0.10
     assert found.alone.false_stable_rate <= 0.01
+
+
+def test_the_shipped_model_keeps_its_promises_with_arcs(screener):
+    sample = reference_sample(1500, 60_002, WITH_ARCS)
+    unstable = point_verdicts(sample.cases, sample.ke, workers=1) != 1.0
+    model = screener.model
+    boundary, line = model.surrogate.boundary(sample.cases), model.certificate(WITH_ARCS).line(1e-4)
+    says_unstable = boundary.score(sample.ke) > 0
+    assert (says_unstable != unstable).mean() <= 0.005
+    verified = line.band.verify(boundary, sample.ke)
+    assert verified.mean() <= 0.12
+    assert not (unstable & ~says_unstable & ~verified).any()
+    assert (~unstable & says_unstable & ~verified).sum() <= 0.01 * (says_unstable & ~verified).sum()
 
 
 def test_the_shipped_model_needs_its_phase_features(screener, unseen, monkeypatch):
@@ -126,9 +140,34 @@ def test_points_say_where_their_answer_comes_from(screener, rotor_37):
     assert found.model == screener.model_id
 
 
-def test_arcs_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
-    arcs = screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]))
-    assert (arcs.source[0], arcs.reason[0]) == (EXACT, OUT_OF_DOMAIN)
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_automatic_map_with_arcs_has_every_verdict_of_the_exact_core(screener, name):
+    blade, contact = (
+        example_blade(name),
+        ContactConfiguration({"LE": 1.0, "TE": 0.5}, [[0.1, 0.3], [0.6, 0.95]]),
+    )
+    speed = np.linspace(0.06 * blade.first_frequency_hz, blade.speed_range_hz[1], 40)
+    ke = np.linspace(0.0, 1e5, 40)
+    found = screener.map(blade, contact, speed, ke, alpha=1e-4)
+    grid = np.meshgrid(speed, ke)
+    exact = verdicts(blade, contact, grid[0].ravel(), grid[1].ravel()).reshape(40, 40)
+    np.testing.assert_array_equal(found.stable, exact)
+    assert found.exact_share <= 0.15
+    assert found.certificate.alpha == 1e-4
+
+
+def test_beyond_the_stiffness_it_was_trained_for_the_exact_core_answers(screener, rotor_37):
+    for contact, kappa in ((LE, 4.0), (ARCS, 1.5)):
+        reach = kappa * CaseBatch.from_blade(rotor_37, contact, np.array([250.0])).stiffness_scale[0]
+        ke = reach * np.array([0.9, 1.1])
+        found = screener.points(rotor_37, contact, np.full(2, 250.0), ke)
+        assert (found.source[1], found.reason[1]) == (EXACT, OUT_OF_DOMAIN)
+        assert found.reason[0] != OUT_OF_DOMAIN
+        with pytest.raises(InvalidInput, match=r"ke = .*the surrogate knows this blade up to"):
+            screener.points(rotor_37, contact, np.full(2, 250.0), ke, policy="surrogate")
+
+
+def test_smooth_engagement_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
     smooth = screener.points(rotor_37, SMOOTH, np.array([250.0]), np.array([1e3]))
     assert (smooth.source[0], smooth.reason[0]) == (EXACT, OUT_OF_DOMAIN)
     slow = screener.boundary(rotor_37, LE, np.array([20.0]), 2.5e4)
@@ -138,8 +177,9 @@ def test_arcs_and_low_speed_are_answered_exactly_and_say_so(screener, rotor_37):
 
 
 def test_the_surrogate_alone_refuses_what_lies_outside_its_domain(screener, rotor_37):
-    with pytest.raises(InvalidInput, match="arcs of contact"):
-        screener.points(rotor_37, ARCS, np.array([250.0]), np.array([1e3]), policy="surrogate")
+    many = ContactConfiguration.at("LE", arcs=[[0.2 * i, 0.2 * i + 0.1] for i in range(5)])
+    with pytest.raises(InvalidInput, match="more than 4 arcs of contact"):
+        screener.points(rotor_37, many, np.array([250.0]), np.array([1e3]), policy="surrogate")
     with pytest.raises(InvalidInput, match="smooth engagement"):
         screener.points(rotor_37, SMOOTH, np.array([250.0]), np.array([1e3]), policy="surrogate")
     with pytest.raises(InvalidInput, match=r"speed_hz\[1\] = 20 Hz: speed/f1 outside"):
@@ -185,7 +225,7 @@ def test_a_blade_whose_contact_node_never_moves_is_stable_without_a_crossing(scr
 
 def with_bands(screener, **spreads):
     """The same model with one line for each alpha, of chosen bands."""
-    (certificate,) = screener.model.certificates
+    certificate = screener.model.certificate(PERMANENT)
     lines = tuple(replace(certificate.table[0], alpha=float(a), spreads=s) for a, s in spreads.items())
     return Screener(replace(screener.model, certificates=(replace(certificate, table=lines),)))
 
@@ -224,7 +264,7 @@ def test_every_certified_rate_can_be_asked_for_and_no_other(screener, rotor_37):
 def test_without_the_surrogate_or_without_verification_there_is_no_certificate(screener, rotor_37):
     speed, ke = np.array([250.0]), np.array([1e3])
     assert screener.map(rotor_37, LE, speed, ke, "exact", alpha=1e-3).certificate is None
-    assert screener.points(rotor_37, ARCS, speed, ke, alpha=1e-3).certificate is None
+    assert screener.points(rotor_37, SMOOTH, speed, ke, alpha=1e-3).certificate is None
     assert screener.boundary(rotor_37, LE, np.array([20.0]), 1e4).certificate is None  # out of domain
     assert screener.map(rotor_37, LE, speed, ke, "surrogate").certificate is None
     with pytest.raises(InvalidInput, match="the surrogate alone keeps no rate"):
