@@ -15,6 +15,7 @@ from training.contact_class import PERMANENT
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation, evaluate
 from training.labelling import critical_kappa
+from training.promotion import promote_unless_worse
 from training.reference_space import NAME, ReferenceSample, reference_sample
 from training.registry import Model, load_model, write_model
 from training.seeds import seed_for
@@ -105,7 +106,7 @@ def recalibrate(
     *,
     activate: bool = True,
     progress: Progress = lambda stage, done, of, remark: None,
-) -> tuple[Model, Calibration]:
+) -> tuple[Model, Calibration, tuple[str, ...]]:
     """Give a model of a folder a new certificate; weights and domain stay.
 
     A card is part of what a model is named after, so the result is another model beside the old one.
@@ -117,6 +118,13 @@ def recalibrate(
     settings
         None draws the points that a training with the model's own seed would draw. Calibrating with one
         seed after another until a certificate pleases would prove nothing.
+    activate
+        Promote the result, unless it is worse than the active model.
+
+    Returns
+    -------
+    The model written, what calibration found, and why it was not promoted (empty where it was, or was not
+    to be).
 
     Raises
     ------
@@ -130,8 +138,10 @@ def recalibrate(
     found = calibrated(old.surrogate, old.design_space, s, progress)
     kept = {k: v for k, v in old.card.items() if k not in ("verification_band", "calibration", "format")}
     card = {**kept, **found.card()}
-    model = write_model(old.surrogate, old.design_space, found.certificates, card, folder, activate=activate)
-    return model, found
+    model = write_model(
+        old.surrogate, old.design_space, found.certificates, card, folder, activate_first=activate
+    )
+    return model, found, promote_unless_worse(model.id, folder) if activate else ()
 
 
 def seed_of(model_id: str | None, folder: Path) -> int:

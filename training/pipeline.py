@@ -10,12 +10,16 @@ import torch
 
 from sdm_core.version import __version__
 from training.calibration import CalibrationSettings, Progress, calibrated
+from training.cases import CaseBatch
 from training.dataset import Dataset
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
 from training.labelling import KAPPA_MAX, critical_kappa
+from training.promotion import promote_unless_worse
 from training.registry import Model, write_model
+from training.served_answers import ServedAnswers
+from training.served_cases import ServedCases
 
 
 @dataclass(frozen=True)
@@ -47,12 +51,13 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """The written model, its held-out figures and how long each stage took, s."""
+    """The written model, its held-out figures, how long each stage took, s, and why it was not promoted."""
 
     model: Model
     evaluation: Evaluation
     dataset_path: Path
     seconds: dict[str, float]
+    refused: tuple[str, ...] = ()
 
 
 def train(
@@ -60,6 +65,7 @@ def train(
     settings: TrainingSettings | None = None,
     *,
     data_folder: Path | None = None,
+    served_folder: Path | None = None,
     activate: bool = True,
     progress: Progress = lambda stage, done, of, remark: None,
 ) -> TrainingResult:
@@ -71,11 +77,16 @@ def train(
         Where the model folder goes.
     data_folder
         Where the labelled dataset goes; by default a ``datasets`` folder beside the models.
+    served_folder
+        Where a service kept its exact answers (`training.served_answers`): their cases join the training
+        set, labelled like the others.
     activate
-        Make it the active model of its folder.
+        Promote it to the active model of its folder, unless it is worse than the one there is.
 
     Raises
     ------
+    InvalidInput
+        When there is no such `served_folder`.
     CalibrationFailed
         When no verification band keeps the false-stable bound; nothing is written then.
     """
@@ -88,7 +99,8 @@ def train(
         seconds[stage] = round(time.perf_counter() - clock, 1)
         clock = time.perf_counter()
 
-    dataset = labelled_dataset(s, progress)
+    served = None if served_folder is None else ServedAnswers.read(served_folder)
+    dataset = labelled_dataset(s, progress, served)
     dataset_path = dataset.write(data_folder or models_folder.parent / "datasets")
     lap("label")
 
@@ -119,16 +131,21 @@ def train(
         **calibration.card(),
     }
     model = write_model(
-        surrogate, s.design_space, calibration.certificates, card, models_folder, activate=activate
+        surrogate, s.design_space, calibration.certificates, card, models_folder, activate_first=activate
     )
-    return TrainingResult(model, calibration.evaluation, dataset_path, seconds)
+    refused = promote_unless_worse(model.id, models_folder) if activate else ()
+    lap("promote")
+    return TrainingResult(model, calibration.evaluation, dataset_path, seconds, refused)
 
 
-def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
-    """Sample the design space and label it with the exact core."""
+def labelled_dataset(s: TrainingSettings, progress: Progress, served: ServedCases | None = None) -> Dataset:
+    """Sample the design space, add what was `served`, and label it all with the exact core."""
     progress("sample", 0, s.designs, "")
     cases = s.design_space.sample(s.designs, s.speeds_each, s.seed)
     progress("sample", s.designs, s.designs, "")
+    joined = None if served is None else served.for_training(s.design_space)
+    if joined is not None:
+        cases = CaseBatch.concatenate([cases, joined.cases])
     kappa = critical_kappa(
         cases, workers=s.threads, progress=lambda done, of: progress("label", done, of, "exact core")
     )
@@ -141,5 +158,6 @@ def labelled_dataset(s: TrainingSettings, progress: Progress) -> Dataset:
         "labels": "closed-form first crossing, proven by root count",
         "kappa_max": KAPPA_MAX,
         "code_version": __version__,
+        **({} if joined is None else {"served": joined.provenance}),
     }
     return Dataset(cases, kappa, provenance)

@@ -44,7 +44,17 @@ def run(
     evaluation_points: Annotated[
         int, typer.Option(help="Further points to evaluate on.", min=1000, rich_help_panel=SIZE)
     ] = 20_000,
-    activate: Annotated[bool, typer.Option(help="Make it the folder's active model.")] = True,
+    with_served: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Also train on what a service answered exactly (rubscreen serve --keep-answers FOLDER).",
+            show_default=False,
+        ),
+    ] = None,
+    activate: Annotated[
+        bool, typer.Option(help="Make it the folder's active model, unless it is worse than that.")
+    ] = True,
     json: Annotated[
         str | None,
         typer.Option(
@@ -60,7 +70,7 @@ def run(
 
     Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
     """
-    from service.commands.models import certificate_table
+    from service.commands.models import certificate_table, say_written
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
     from training.certificate import CalibrationFailed
     from training.fit import FitSettings
@@ -82,6 +92,7 @@ def run(
             made = train(
                 Path(folder),
                 settings,
+                served_folder=None if with_served is None else Path(with_served),
                 activate=activate,
                 progress=lambda stage, done, of, remark: show(done, of, f"{stage} {remark}"),
             )
@@ -98,10 +109,15 @@ def run(
         f"99 of 100 below {made.evaluation.p99_boundary_error:.2%}"
     )
     console.print(f"[dim]seconds: {', '.join(f'{k} {v:g}' for k, v in made.seconds.items())}[/dim]")
-    console.print(f"model {made.model.id} in {folder}{', now active' if activate else ''}")
     if json:
-        report = {"model": made.model.id, "seconds": made.seconds, "evaluation": made.evaluation.to_dict()}
+        report = {
+            "model": made.model.id,
+            "seconds": made.seconds,
+            "evaluation": made.evaluation.to_dict(),
+            "refused": list(made.refused),
+        }
         write_json(json, report, indent=True)
+    say_written(console, made.model.id, folder, activate, made.refused)
 
 
 def _figures(evaluation: Evaluation) -> Table:
