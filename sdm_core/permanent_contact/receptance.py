@@ -202,8 +202,16 @@ class ContactReceptance:
         matrix = self._matrix(h, sets)
         # Where λ is right already H − λI is singular; so far off, the step still restores it. The second
         # part keeps it off where λ is so much smaller than H that the first is lost in rounding.
-        start = (1.0 / guess) * (1 + 1e-11j) + 1e-14j * np.abs(matrix).max(axis=(1, 2))
-        inverse = np.linalg.inv(matrix - start[:, None, None] * np.eye(self.rank))
+        aside = 1e-11j / guess + 1e-14j * np.abs(matrix).max(axis=(1, 2))
+        for times in (1, 3, 9):
+            start = 1.0 / guess + times * aside
+            try:
+                inverse = np.linalg.inv(matrix - start[:, None, None] * np.eye(self.rank))
+                break
+            except np.linalg.LinAlgError:
+                # Rarely a guess is off by just as much to the other side, and meets λ to the last bit.
+                if times == 9:
+                    raise
         trace = np.trace(inverse, axis1=1, axis2=2)
         slope = self._matrix(self._modal_slope(h, w, sets), sets)
         return start + trace / (inverse**2).sum(axis=(1, 2)), (inverse * slope).sum(axis=(1, 2)) / trace
