@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from nearby_models import nearby
 
-from sdm_core.blade import example_blade
+from sdm_core.blade import blade_from_dict
 from sdm_core.contact import ContactConfiguration
 from service.app import create_app
 from service.rest import replies
@@ -32,7 +32,8 @@ SPEEDS = np.linspace(150.0, 300.0, 12)
 KE_MAX = 1e6
 # The surrogate's own boundary: every number in it depends on the weights.
 QUESTION = BOUNDARY_EXAMPLE | {"speed_hz": SPEEDS.tolist(), "ke_max": KE_MAX, "policy": "surrogate"}
-LE = ContactConfiguration.at("LE")
+BLADE = blade_from_dict(BOUNDARY_EXAMPLE["blade"])
+CONTACT = ContactConfiguration.from_dict(BOUNDARY_EXAMPLE["contact"])
 
 
 def unmeasured(candidate, active):
@@ -67,8 +68,7 @@ def model_of(http: httpx.Client) -> str:
 
 def exact_reply(folder: Path, model_id: str) -> dict[str, Any]:
     """What the model answers, computed here."""
-    blade = example_blade("nasa_rotor_37")
-    found = Screener.default(folder, model_id).boundary(blade, LE, SPEEDS, KE_MAX, "surrogate")
+    found = Screener.default(folder, model_id).boundary(BLADE, CONTACT, SPEEDS, KE_MAX, "surrogate")
     return json.loads(replies.to_json(replies.boundary_to_dict(found)))
 
 
@@ -76,7 +76,6 @@ def test_no_request_is_lost_or_answered_by_half_a_model_while_models_change(http
     first, second = active_id(folder), nearby(folder, 1.001).id
     expected = {model: exact_reply(folder, model) for model in (first, second)}
     assert not set(expected[first]["critical_ke"]) & set(expected[second]["critical_ke"])
-    assert BOUNDARY_EXAMPLE["contact"] == {"weights": {"LE": 1.0}}
     stop, answers = threading.Event(), []
 
     def ask(client: httpx.Client) -> httpx.Response:
@@ -113,7 +112,7 @@ def test_who_asked_before_the_change_is_answered_by_the_model_of_then(folder):
     promote(second, folder, check=unmeasured)
     model.follow()
     assert (began.model_id, model.now.model_id) == (first, second)
-    old = began.screener.boundary(example_blade("nasa_rotor_37"), LE, SPEEDS, KE_MAX, "surrogate")
+    old = began.screener.boundary(BLADE, CONTACT, SPEEDS, KE_MAX, "surrogate")
     assert json.loads(replies.to_json(replies.boundary_to_dict(old))) == exact_reply(folder, first)
 
 
