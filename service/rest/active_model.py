@@ -113,7 +113,7 @@ class WatchedModel(ActiveModel):
             self.fault = None
         except Exception as error:  # whatever it is: a thread that died would never follow again
             self.fault = error if isinstance(error, InvalidInput) else _unexpected(self._folder, error)
-            logger.error("model %s goes on answering: %s", self.now.model_id, self.fault)
+            logger.error("%s goes on answering: %s", self.now.model_id or "the exact core", self.fault)
         finally:
             self.loading = None
 
@@ -121,7 +121,7 @@ class WatchedModel(ActiveModel):
         screener = Screener.default(self._folder, model_id, on_exact=self._on_exact)
         self_check(screener, "auto")
         old, self.now = self.now.model_id, Answering(screener)
-        logger.info("model %s answers from now on, after %s", model_id, old)
+        logger.info("%s answers from now on, after %s", model_id, old or "the exact core")
 
     def _watch(self, poll_s: float) -> None:
         while not self._closing.wait(poll_s):

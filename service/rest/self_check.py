@@ -28,6 +28,6 @@ def self_check(answerer: Answerer, policy: str) -> PointAnswers:
     """
     found = answerer.points(_BLADE, _CONTACT, _SPEED_HZ, _KE, policy)
     if found.stable.tolist() != _STABLE:
-        remedy = f"it must be {_STABLE}: install the service again"
+        remedy = f"it must be {_STABLE}: activate another model, or install the service again"
         raise NotReady("self_check", f"{found.stable.tolist()} under {policy}", remedy)
     return found
