@@ -179,8 +179,9 @@ class ServedCases:
         g = g * sign[:, :, None] * sign[:, None, :]
         g[np.abs(g) < 1e-12] = 0.0
         turn = 2 * np.pi * self.speed_hz / self.omega[:, 0]
-        # Few patterns of arcs, many cases.
-        patterns, which = np.unique(self.arcs.reshape(-1, 2 * ARCS), axis=0, return_inverse=True)
+        # Few patterns of arcs, many cases; no NaN, which equals nothing.
+        flat = np.nan_to_num(self.arcs.reshape(-1, 2 * ARCS), nan=-1.0)
+        patterns, which = np.unique(flat, axis=0, return_inverse=True)
         turned = [_from_its_first_arc(a.reshape(ARCS, 2)).ravel() for a in patterns]
         arcs = np.reshape(turned, (-1, 2 * ARCS))[which]
         return np.concatenate([ratio, damping, g.reshape(len(self), -1), turn[:, None], arcs], axis=1)
@@ -199,8 +200,8 @@ def _arcs_of(contact: ContactConfiguration) -> np.ndarray | None:
 
 
 def _from_its_first_arc(arcs: np.ndarray) -> np.ndarray:
-    """Arcs turned so that one of them begins at 0, whichever gives the lowest row of numbers."""
-    there = arcs[~np.isnan(arcs[:, 0])]
+    """Arcs (below 0: none) turned so that one of them begins at 0, whichever gives the lowest numbers."""
+    there = arcs[arcs[:, 0] >= 0.0]
     if not len(there):
         return np.zeros(arcs.shape)
     if there[0, 1] - there[0, 0] >= 1.0:
