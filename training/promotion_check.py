@@ -134,13 +134,14 @@ class _Answers:
         return Counted(int(self.wrong[mistake].sum()), int(answered.sum()))
 
     def figures(self) -> dict[str, Any]:
-        median = float(np.median(self.boundary_error))
+        middle = float(np.median(self.boundary_error))
+        median = middle if np.isfinite(middle) else None  # JSON has no infinity
         counts = {name: [self.counted(name).wrong, self.counted(name).answered] for name in MISTAKES}
         return {"points": len(self.sample.ke), "median_boundary_error": median, **counts}
 
 
 def _breaks_certificate(found: _Answers, certificate: Certificate) -> Iterator[str]:
-    """Lines of the certificate that the fresh points contradict."""
+    """The loosest line of the certificate that the fresh points contradict, if any."""
     boundary = found.model.surrogate.boundary(found.sample.cases)
     inside = found.model.design_space.contains(found.sample.cases)
     for line in certificate.table:
@@ -151,6 +152,7 @@ def _breaks_certificate(found: _Answers, certificate: Certificate) -> Iterator[s
                 f"{in_words(certificate.contact)}: certified for {line.alpha:g}, but of {of:,} fresh points "
                 f"it calls stable unverified, {errors} are unstable"
             )
+            return
 
 
 def _breaks_figures(found: _Answers, said: HeldOut, contact: str) -> Iterator[str]:

@@ -18,8 +18,9 @@ COST_FACTOR, COST_SHARE = 1.25, 0.002
 # A mistake is more frequent when the counts contradict, with 99 % confidence, a rate of up to 1.25 times
 # what it is now.
 RATE_FACTOR, LEVEL = 1.25, 0.01
-# A quarter more boundary error is over two standard errors of a 99 % quantile of 20,000 points; below the
-# second figures it matters to nobody: a tenth of what is asked of a surrogate.
+# A quarter more boundary error is 2.5 standard errors of the difference of two 99 % quantiles of 20,000
+# points each (7 % each, by bootstrap). Up to the second figures it matters to nobody: a tenth of what is
+# asked of a surrogate.
 ERROR_FACTOR, ERROR_SLACK = 1.25, {0.5: 3e-4, 0.99: 5e-3}
 
 

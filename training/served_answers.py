@@ -67,7 +67,7 @@ class ServedAnswers:
         self._folder, self._most_rows, self._flush_s = folder, most_rows, flush_s
         self._queue: queue.SimpleQueue[ExactAnswers | threading.Event | None] = queue.SimpleQueue()
         self._most_waiting, self._waiting, self._lock = most_waiting, 0, threading.Lock()
-        self.dropped = 0
+        self.dropped, self._complained = 0, False
         self._seen: dict[bytes, None] = {}  # in order of age, as no set is
         self._known: set[Path] = set()
         self._fresh: list[ServedCases] = []
@@ -166,6 +166,7 @@ class ServedAnswers:
             self._chunk_path.unlink(missing_ok=True)
         self._known.add(path)
         self._remember(fresh)
+        self._complained = False
         full = len(whole) >= CHUNK_ROWS
         self._chunk, self._chunk_path = (ServedCases.none(), None) if full else (whole, path)
         drop_oldest(self._folder, self._most_rows, MOST_FILES)
@@ -184,6 +185,7 @@ class ServedAnswers:
             del self._seen[name]
 
     def _drop(self, count: int, error: Exception) -> None:
-        if not self.dropped:  # once, or a full disk fills the log
+        if not self._complained:  # once, or a full disk fills the log
             logger.error("exact answers are not kept in %s: %s", self._folder, error)
+        self._complained = True
         self.dropped += count

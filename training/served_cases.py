@@ -184,7 +184,7 @@ class ServedCases:
         patterns, which = np.unique(flat, axis=0, return_inverse=True)
         turned = [_from_its_first_arc(a.reshape(ARCS, 2)).ravel() for a in patterns]
         arcs = np.reshape(turned, (-1, 2 * ARCS))[which]
-        return np.concatenate([ratio, damping, g.reshape(len(self), -1), turn[:, None], arcs], axis=1)
+        return np.concatenate([ratio, damping, g.reshape(len(self), MODES**2), turn[:, None], arcs], axis=1)
 
 
 def _arcs_of(contact: ContactConfiguration) -> np.ndarray | None:

@@ -39,9 +39,9 @@ def run(
     from service.app import create_app
     from service.commands.outputs import check_writable
 
-    if keep_answers is not None:
-        check_writable(**{"keep-answers": f"{keep_answers}/served"})
     settings = settings_from(models, keep_answers)
+    if settings.served_answers_folder is not None:
+        check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
     app = create_app(settings)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"

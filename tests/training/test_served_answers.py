@@ -207,6 +207,18 @@ def test_several_processes_keep_all_their_answers_in_one_folder(tmp_path):
     assert sorted(found.speed_hz) == sorted(expected)
 
 
+def test_nothing_to_keep_is_nothing_to_complain_about(tmp_path, caplog):
+    with caplog.at_level(logging.WARNING):
+        kept = ServedAnswers(tmp_path / "served")
+        kept.flush()
+        kept.keep(crossings([]))
+        kept.close()
+    assert not caplog.records and list((tmp_path / "served").iterdir()) == []
+    nothing = ServedAnswers.read(tmp_path / "served")
+    assert len(nothing) == 0 == nothing.for_training(DesignSpace()).provenance["cases"]
+    assert len(nothing.bounds()[0]) == 0
+
+
 def test_several_threads_keep_all_their_answers(kept, folder):
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda i: kept.keep(crossings([100.0 + i / 4])), range(400)))
