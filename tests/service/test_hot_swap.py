@@ -116,6 +116,12 @@ def test_who_asked_before_the_change_is_answered_by_the_model_of_then(folder):
     assert json.loads(replies.to_json(replies.boundary_to_dict(old))) == exact_reply(folder, first)
 
 
+def point_at(folder: Path, model: str) -> None:
+    """Move the pointer without asking anybody."""
+    (folder / ".pointer").write_text(model + "\n")
+    (folder / ".pointer").replace(folder / "active")
+
+
 def cut(file: Path) -> None:
     file.write_bytes(file.read_bytes()[:-100])
 
@@ -135,7 +141,7 @@ def test_the_old_model_answers_when_the_new_one_is_damaged(http, folder, how, ca
     first, second, third = active_id(folder), nearby(folder, 1.001).id, nearby(folder, 1.002).id
     BROKEN[how](folder, second)
     with caplog.at_level(logging.ERROR, "rubscreen.service"):
-        (folder / "active").write_text(second + "\n")
+        point_at(folder, second)
         wait_until(lambda: http.get("/readyz").json()["fault"] is not None, "the fault was never shown")
         time.sleep(0.1)  # many looks at the pointer
     assert len(caplog.records) == 1 and f"{first} goes on answering" in caplog.text
@@ -143,7 +149,7 @@ def test_the_old_model_answers_when_the_new_one_is_damaged(http, folder, how, ca
     assert ready["model"] == first and second in ready["fault"] and models["fault"] == ready["fault"]
     assert [entry["id"] for entry in models["models"] if entry["active"]] == [first]
     assert http.post("/v1/boundary", json=QUESTION).json() == exact_reply(folder, first)
-    (folder / "active").write_text(third + "\n")
+    point_at(folder, third)
     wait_until(lambda: model_of(http) == third, "the next model never answered")
     assert http.get("/readyz").json()["fault"] is None
 
@@ -179,12 +185,11 @@ def test_a_damaged_model_answers_once_it_is_mended_and_pointed_at_again(folder):
     model, second = WatchedModel(folder, poll_s=0.0), nearby(folder, 1.001)
     whole = (folder / second.id / "model.safetensors").read_bytes()
     cut(folder / second.id / "model.safetensors")
-    (folder / "active").write_text(second.id + "\n")
+    point_at(folder, second.id)
     model.follow()
     assert model.now.model_id != second.id and model.fault is not None
     (folder / second.id / "model.safetensors").write_bytes(whole)
-    (folder / "active").unlink()
-    (folder / "active").write_text(second.id + "\n")
+    point_at(folder, second.id)
     model.follow()
     assert model.now.model_id == second.id and model.fault is None and model.loading is None
 
