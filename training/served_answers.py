@@ -14,7 +14,7 @@ import numpy as np
 from sdm_core.errors import InvalidInput
 from training.exact_answers import ExactAnswers
 from training.served_cases import ServedCases
-from training.served_chunks import chunks, drop_oldest, whole_chunks, write_chunk
+from training.served_chunks import chunks, drop_oldest, every_chunk, whole_chunks, write_chunk
 
 CHUNK_ROWS = 5_000
 MOST_FILES = 1_000
@@ -109,7 +109,7 @@ class ServedAnswers:
         """
         if not folder.is_dir():
             raise InvalidInput("served answers", str(folder), "give the folder a service kept its answers in")
-        return ServedCases.concatenate(whole_chunks(chunks(folder))).distinct()
+        return ServedCases.concatenate(every_chunk(folder)).distinct()
 
     def _work(self) -> None:
         due = 0.0

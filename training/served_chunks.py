@@ -79,6 +79,16 @@ def whole_chunks(paths: list[Path]) -> list[ServedCases]:
     return found
 
 
+def every_chunk(folder: Path) -> list[ServedCases]:
+    """All that can be read, while others write: a chunk may be replaced by a fuller one at any time."""
+    known: set[Path] = set()
+    found: list[ServedCases] = []
+    while unknown := [path for path in chunks(folder) if path not in known]:
+        known.update(unknown)
+        found += whole_chunks(unknown)
+    return found
+
+
 def drop_oldest(folder: Path, most_rows: int, most_files: int) -> None:
     """Delete the oldest chunks until what is left is within both bounds."""
     rows = 0

@@ -256,6 +256,23 @@ def test_damaged_files_are_skipped_with_a_warning(tmp_path, caplog):
     assert sorted(ServedAnswers.read(tmp_path).speed_hz) == [100.0, 102.0]
 
 
+def test_a_file_replaced_while_it_is_read_is_not_missed(kept, folder, monkeypatch):
+    kept.keep(crossings([100.0]))
+    kept.flush()
+    listed = served_chunks.chunks
+
+    def and_then_replaced(where):
+        paths = listed(where)
+        monkeypatch.setattr(served_chunks, "chunks", listed)
+        kept.keep(crossings([101.0]))
+        kept.flush()
+        assert not paths[0].exists()
+        return paths
+
+    monkeypatch.setattr(served_chunks, "chunks", and_then_replaced)
+    assert sorted(ServedAnswers.read(folder).speed_hz) == [100.0, 101.0]
+
+
 def test_a_full_disk_costs_the_answers_of_that_time_and_no_others(kept, folder, monkeypatch, caplog):
     def full(*arguments):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
