@@ -63,8 +63,14 @@ def held_out(card: Mapping[str, Any]) -> dict[str, HeldOut]:
     evaluation = card.get("evaluation")
     if not isinstance(evaluation, Mapping):
         return {}
-    by_contact = {PERMANENT: evaluation} if "auto" in evaluation or "alone" in evaluation else evaluation
-    return {name: _read(found) for name, found in by_contact.items() if isinstance(found, Mapping)}
+    if "auto" in evaluation or "alone" in evaluation:
+        return {PERMANENT: _read(evaluation)}
+    for_all = {key: value for key, value in evaluation.items() if not isinstance(value, Mapping)}
+    return {
+        contact: _read({**for_all, **figures})
+        for contact, figures in evaluation.items()
+        if isinstance(figures, Mapping)
+    }
 
 
 def _named(group: str, mistake: str) -> str:

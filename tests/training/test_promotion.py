@@ -169,6 +169,8 @@ def _arcs_worse(card):
 def test_a_card_speaks_of_permanent_contact_unless_it_names_the_class():
     figures = {"auto": {}, "distribution": NAME, "median_boundary_error": 0.1}
     assert held_out({"evaluation": figures}) == held_out({"evaluation": {PERMANENT: figures}})
+    apart = {"distribution": NAME, PERMANENT: {k: v for k, v in figures.items() if k != "distribution"}}
+    assert held_out({"evaluation": apart}) == held_out({"evaluation": figures})
     assert held_out({}) == held_out({"evaluation": None}) == {}
 
 
