@@ -240,16 +240,19 @@ def test_the_oldest_answers_go_when_there_are_too_many(tmp_path, monkeypatch):
 
 
 def test_damaged_files_are_skipped_with_a_warning(tmp_path, caplog):
-    for i in range(3):
+    for i in range(4):
         kept = ServedAnswers(tmp_path)
-        kept.keep(crossings([100.0 + i]))
+        kept.keep(crossings([99.0 + i]))
         kept.close()
-    first, second, _ = served_chunks.chunks(tmp_path)
+    altered, first, second, _ = served_chunks.chunks(tmp_path)
+    with np.load(altered) as whole:
+        arrays = dict(whole)
+    np.savez(altered, **{**arrays, "ke": 2 * arrays["ke"]})
     first.write_bytes(first.read_bytes()[:-40])
     second.write_bytes(second.read_bytes().replace(b"speed_hz", b"speed_hx"))
     with caplog.at_level(logging.WARNING):
         assert ServedAnswers.read(tmp_path).speed_hz.tolist() == [102.0]
-    assert sum("skipped" in record.message for record in caplog.records) == 2
+    assert sum("skipped" in record.message for record in caplog.records) == 3
     kept = ServedAnswers(tmp_path)
     kept.keep(crossings([100.0]))
     kept.close()
