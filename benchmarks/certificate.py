@@ -6,9 +6,10 @@ import numpy as np
 from rich.console import Group
 from rich.table import Table
 
-from training.calibration import CLASSES, truth
+from training.calibration import CLASSES
 from training.contact_class import PERMANENT, in_words
 from training.evaluation import VerdictFigures, evaluate
+from training.labelling import truth
 from training.learn_then_test import binomial_p_value
 from training.reference_space import NAME, reference_sample
 from training.registry import Model, load_model
@@ -28,7 +29,7 @@ def _of_class(model: Model, contact: str, count: int) -> Table:
     # A seed of its own: training, calibration and the evaluation on the card have others.
     purpose = "certificate benchmark" if contact == PERMANENT else f"certificate benchmark, {contact}"
     sample = reference_sample(count, seed_for(purpose, 2013), contact)
-    critical, unstable = truth(sample, workers=2)
+    critical, unstable = truth(sample.cases, sample.ke)
     boundary = model.surrogate.boundary(sample.cases)
     inside = model.design_space.contains(sample.cases, sample.ke)
 

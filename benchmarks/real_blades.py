@@ -11,10 +11,11 @@ from sdm_core.blade import Blade, example_blade
 from sdm_core.blade.build import build_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import RubscreenError
-from training.calibration import CLASSES, truth
+from training.calibration import CLASSES
 from training.cases import CaseBatch
 from training.contact_class import PERMANENT, in_words
 from training.evaluation import evaluate
+from training.labelling import truth
 from training.reference_space import ReferenceSample
 from training.registry import load_model
 from training.space_filling import random_arcs
@@ -80,7 +81,7 @@ def table(blades: list[Blade] | None = None, alpha: float = 1e-3) -> Table:
             parts = [points(blade, contact, each, rng) for blade in some]
             cases = CaseBatch.concatenate([p.cases for p in parts])
             sample = ReferenceSample(cases, np.concatenate([p.ke for p in parts]))
-            critical, unstable = truth(sample, workers=2)
+            critical, unstable = truth(sample.cases, sample.ke)
             inside = model.design_space.contains(sample.cases, sample.ke)
             certificate = model.certificate(contact)
             assert certificate is not None

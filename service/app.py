@@ -46,7 +46,7 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
         try:
             yield {"desk": desk}
         finally:
-            desk.work.close()
+            desk.close()
 
     # Not plain FastAPI, whose /docs loads its scripts from the internet.
     app: FastAPI = FastAPIOffline(

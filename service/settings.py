@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from annotated_types import Gt
+from annotated_types import Ge, Gt
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 Count = Annotated[int, Gt(0)]
@@ -21,6 +21,10 @@ class Settings(BaseSettings):
     ----------
     models_folder
         Where the models are; None is the one that came with the package.
+    models_poll_s
+        How often the service looks whether another model has become active, s; 0 is never.
+    served_answers_folder
+        Where exact answers are kept for retraining; None keeps none.
     max_body_bytes
         Largest request body; longer ones are refused while they arrive.
     body_timeout_s
@@ -63,6 +67,8 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="RUBSCREEN_", frozen=True, extra="forbid")
 
     models_folder: Path | None = None
+    models_poll_s: Annotated[float, Ge(0)] = 1.0
+    served_answers_folder: Path | None = None
     max_body_bytes: Count = 16 * 2**20
     body_timeout_s: Seconds = 60.0
     max_points: Count = 250_000

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sdm_core.version import __version__
 from training.certificate import DEFAULT_ALPHA, CalibrationFailed, Certificate, certify
 from training.contact_class import ARCS, PERMANENT, in_words
 from training.design_space import DesignSpace
 from training.evaluation import Evaluation, evaluate
-from training.labelling import critical_kappa, point_verdicts
-from training.reference_space import NAME, ReferenceSample, reference_sample
+from training.labelling import point_verdicts, truth
+from training.promotion import promote_unless_worse
+from training.reference_space import NAME, reference_sample
 from training.registry import Model, load_model, write_model
 from training.seeds import seed_for
 from training.surrogate import Surrogate
@@ -96,7 +95,7 @@ def calibrated(
         def report(done: int, of: int, contact: str = contact) -> None:
             progress("evaluate", done, of, in_words(contact))
 
-        critical, unstable = truth(sample, settings.workers, report)
+        critical, unstable = truth(sample.cases, sample.ke, workers=settings.workers, progress=report)
         evaluations[contact] = evaluate(
             surrogate.boundary(sample.cases),
             certificate.line().band,
@@ -143,7 +142,7 @@ def recalibrate(
     *,
     activate: bool = True,
     progress: Progress = lambda stage, done, of, remark: None,
-) -> tuple[Model, Calibration]:
+) -> tuple[Model, Calibration, tuple[str, ...]]:
     """Give a model of a folder a new certificate; weights and domain stay.
 
     A card is part of what a model is named after, so the result is another model beside the old one.
@@ -155,6 +154,13 @@ def recalibrate(
     settings
         None draws the points that a training with the model's own seed would draw. Calibrating with one
         seed after another until a certificate pleases would prove nothing.
+    activate
+        Promote the result, unless it is worse than the active model.
+
+    Returns
+    -------
+    The model written, what calibration found, and why it was not promoted (empty where it was, or was not
+    to be).
 
     Raises
     ------
@@ -168,8 +174,10 @@ def recalibrate(
     found = calibrated(old.surrogate, old.design_space, s, progress)
     kept = {k: v for k, v in old.card.items() if k not in ("verification_band", "calibration", "format")}
     card = {**kept, **found.card()}
-    model = write_model(old.surrogate, old.design_space, found.certificates, card, folder, activate=activate)
-    return model, found
+    model = write_model(
+        old.surrogate, old.design_space, found.certificates, card, folder, activate_first=activate
+    )
+    return model, found, promote_unless_worse(model.id, folder) if activate else ()
 
 
 def seed_of(model_id: str | None, folder: Path) -> int:
@@ -179,19 +187,3 @@ def seed_of(model_id: str | None, folder: Path) -> int:
 
 def _seed_of(model: Model) -> int:
     return int(model.card.get("seed", CalibrationSettings.seed))
-
-
-def truth(
-    sample: ReferenceSample, workers: int, progress: Callable[[int, int], None] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Exact first crossings, N/m, and which points are unstable; shape (m,) each.
-
-    In permanent contact the first crossing decides. With arcs stability may return above it, so that every
-    point gets a verdict of its own.
-    """
-    kappa = critical_kappa(sample.cases, workers=workers, progress=progress)
-    critical = kappa * sample.cases.stiffness_scale
-    unstable, arcs = sample.ke > critical, ~sample.cases.permanent
-    if arcs.any():
-        unstable[arcs] = point_verdicts(sample.cases[arcs], sample.ke[arcs], workers=workers) != 1.0
-    return critical, unstable

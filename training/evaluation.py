@@ -105,7 +105,7 @@ def evaluate(
     with np.errstate(divide="ignore", invalid="ignore"):
         near = np.abs(ke / critical_ke - 1) <= HARD
     predicted = 10.0**boundary.log_ke
-    error = _boundary_error(predicted, critical_ke, ke_max)
+    error = boundary_errors(predicted, critical_ke, ke_max)
     none = np.zeros(len(ke), dtype=bool)
 
     def count(rows: np.ndarray, checked: np.ndarray) -> VerdictFigures:
@@ -132,7 +132,11 @@ def evaluate(
     )
 
 
-def _boundary_error(predicted: np.ndarray, exact: np.ndarray, ke_max: np.ndarray | None) -> np.ndarray:
+def boundary_errors(predicted: np.ndarray, exact: np.ndarray, ke_max: np.ndarray | None) -> np.ndarray:
+    """Relative errors of first crossings, a missed or spurious one below `ke_max` infinite.
+
+    Cases whose exact crossing is not known (NaN) are left out.
+    """
     limit = np.full(len(exact), np.inf) if ke_max is None else ke_max
     seen, there = predicted <= limit, np.isfinite(exact) & (exact <= limit)
     error = np.zeros(len(exact))

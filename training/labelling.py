@@ -93,6 +93,21 @@ def point_verdicts(
     return out
 
 
+def truth(
+    cases: CaseBatch, ke: np.ndarray, *, workers: int = 2, progress: Progress | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exact first crossings, N/m, and which points (case, K_e in N/m) are unstable; shape (m,) each.
+
+    In permanent contact the first crossing decides. With arcs stability may return above it, so that every
+    point gets a verdict of its own; one that is not decided counts as unstable.
+    """
+    critical = critical_kappa(cases, workers=workers, progress=progress) * cases.stiffness_scale
+    unstable, arcs = ke > critical, ~cases.permanent
+    if arcs.any():
+        unstable[arcs] = point_verdicts(cases[arcs], ke[arcs], workers=workers) != 1.0
+    return critical, unstable
+
+
 def _solved(calls: Sequence[_Call], workers: int) -> Iterator[tuple[int, np.ndarray]]:
     """Results as they come, with the place of the call they are of."""
     if workers <= 1:

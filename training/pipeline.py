@@ -15,6 +15,7 @@ import torch
 from sdm_core.version import __version__
 from training.active_learning import ActiveLearner
 from training.calibration import CLASSES, CalibrationSettings, Progress, calibrated
+from training.cases import CaseBatch
 from training.contact_class import in_words
 from training.dataset import Dataset, kept_labels
 from training.design_space import DesignSpace
@@ -22,7 +23,10 @@ from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
 from training.labelling import critical_kappa
 from training.monitoring import Goal, Monitor
+from training.promotion import promote_unless_worse
 from training.registry import Model, write_model
+from training.served_answers import ServedAnswers
+from training.served_cases import TrainingCases
 from training.surrogate import Surrogate
 
 
@@ -82,13 +86,20 @@ class Round:
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """The written model, its held-out figures by class of contact, and how long each stage took, s."""
+    """The written model, its held-out figures by class of contact, and how long each stage took, s.
+
+    Attributes
+    ----------
+    refused
+        Why it was not promoted.
+    """
 
     model: Model
     evaluations: dict[str, Evaluation]
     dataset_path: Path
     rounds: tuple[Round, ...]
     seconds: dict[str, float]
+    refused: tuple[str, ...] = ()
 
 
 def train(
@@ -96,6 +107,7 @@ def train(
     settings: TrainingSettings | None = None,
     *,
     data_folder: Path | None = None,
+    served_folder: Path | None = None,
     activate: bool = True,
     progress: Progress = lambda stage, done, of, remark: None,
 ) -> TrainingResult:
@@ -108,21 +120,29 @@ def train(
     data_folder
         Where the labelled dataset goes; by default a ``datasets`` folder beside the models. Labels are kept
         there round by round, so that a training that was killed does not label again.
+    served_folder
+        Where a service kept its exact answers (`training.served_answers`): their cases join the training
+        set, labelled like the others.
     activate
-        Make it the active model of its folder.
+        Promote it to the active model of its folder, unless it is worse than the one there is.
 
     Raises
     ------
+    InvalidInput
+        When there is no such `served_folder`.
     CalibrationFailed
         When no verification band keeps the false-stable bound; nothing is written then.
     """
     s = settings or TrainingSettings()
     watch = _Watch()
     data_folder = data_folder or models_folder.parent / "datasets"
+    served = None
+    if served_folder is not None:
+        served = ServedAnswers.read(served_folder).for_training(s.design_space)
     with _torch_threads(1):
-        learner, rounds = _asked(s, data_folder, watch, progress)
+        learner, rounds = _asked(s, served, data_folder, watch, progress)
         cases, kappa = learner.labelled
-        dataset = Dataset(cases, kappa, _provenance(s, learner.labels, rounds))
+        dataset = Dataset(cases, kappa, _provenance(s, learner.labels, rounds, served))
         dataset_path = dataset.write(data_folder)
         surrogate = _fitted(learner, s, s.fit, progress, "fit")
         watch.lap("fit")
@@ -140,13 +160,15 @@ def train(
         **calibration.card(),
     }
     model = write_model(
-        surrogate, s.design_space, calibration.certificates, card, models_folder, activate=activate
+        surrogate, s.design_space, calibration.certificates, card, models_folder, activate_first=activate
     )
-    return TrainingResult(model, calibration.evaluations, dataset_path, tuple(rounds), watch.seconds)
+    refused = promote_unless_worse(model.id, models_folder) if activate else ()
+    watch.lap("promote")
+    return TrainingResult(model, calibration.evaluations, dataset_path, tuple(rounds), watch.seconds, refused)
 
 
 def _asked(
-    s: TrainingSettings, data_folder: Path, watch: _Watch, progress: Progress
+    s: TrainingSettings, served: TrainingCases | None, data_folder: Path, watch: _Watch, progress: Progress
 ) -> tuple[ActiveLearner, list[Round]]:
     """Label, fit and ask again, until the goal is certified on the monitoring sample or rounds are over."""
     learner, rounds = ActiveLearner(s.design_space, s.seed), []
@@ -155,6 +177,8 @@ def _asked(
         stage = f"label, round {number} of {s.rounds}"
         progress(stage, 0, 1, "drawing")
         cases = learner.ask(s.cases_each if number else s.first_cases)
+        if served is not None and number == 0:
+            cases = CaseBatch.concatenate([cases, served.cases])
 
         def labelled(done: int, of: int, stage: str = stage) -> None:
             progress(stage, done, of, "exact core")
@@ -199,7 +223,9 @@ def _fitted(
     )
 
 
-def _provenance(s: TrainingSettings, labels: int, rounds: list[Round]) -> dict[str, Any]:
+def _provenance(
+    s: TrainingSettings, labels: int, rounds: list[Round], served: TrainingCases | None
+) -> dict[str, Any]:
     return {
         "design_space": s.design_space.to_dict(),
         "sampling": "scrambled Sobol, then by risk",
@@ -209,6 +235,7 @@ def _provenance(s: TrainingSettings, labels: int, rounds: list[Round]) -> dict[s
         "seed": s.seed,
         "labelled_by": "in permanent contact closed form, proven by root count; with arcs by verdicts",
         "code_version": __version__,
+        **({} if served is None else {"served": served.provenance}),
     }
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,8 @@ import safetensors.torch
 from safetensors import SafetensorError
 
 from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.whole_files import staged
+from training.activation import ACTIVE, FIRST, SHIPPED, activate, active_id
 from training.certificate import Certificate
 from training.design_space import DesignSpace
 from training.features import feature_names
@@ -22,8 +23,7 @@ from training.surrogate import Architecture, BoundaryNetwork, Surrogate
 FORMAT = "rubscreen/model/2"
 # Cards before certificates of several rates: their weights are as good, once they are recalibrated.
 _UNCERTIFIED_FORMAT = "rubscreen/model/1"
-SHIPPED = Path(__file__).parent / "models"
-_WEIGHTS, _CARD, _ACTIVE = "model.safetensors", "card.json", "active"
+_WEIGHTS, _CARD = "model.safetensors", "card.json"
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,23 @@ def write_model(
     card: dict[str, Any],
     folder: Path = SHIPPED,
     *,
-    activate: bool = True,
+    activate_first: bool = True,
 ) -> Model:
     """Write a model into its own folder under `folder`, whole or not at all.
 
-    The identifier is the hash of weights and card, so a model never changes under its name.
+    The identifier is the hash of weights and card, so a model never changes under its name. Where the same
+    model lies already and is damaged, it is mended.
+
+    Parameters
+    ----------
+    activate_first
+        Make it active where the folder has no active model yet. An active model is replaced by
+        `training.promotion` alone, which compares the two.
+
+    Raises
+    ------
+    InvalidInput
+        When the folder cannot be written; what lay there stays as it was.
     """
     weights = safetensors.torch.save(surrogate.network.state_dict())
     full = {
@@ -76,17 +88,9 @@ def write_model(
     }
     text = json.dumps(full, indent=1, sort_keys=True) + "\n"
     model_id = _identifier(weights, text)
-    target = folder / model_id
-    if not target.exists():
-        partial = folder / f".{model_id}.{os.getpid()}.partial"
-        partial.mkdir(parents=True)
-        (partial / _WEIGHTS).write_bytes(weights)
-        (partial / _CARD).write_text(text, encoding="utf-8")
-        partial.replace(target)
-    if activate:
-        pointer = folder / f".{_ACTIVE}.{os.getpid()}.partial"
-        pointer.write_text(model_id + "\n", encoding="utf-8")
-        pointer.replace(folder / _ACTIVE)
+    _write_files(folder / model_id, {_WEIGHTS: weights, _CARD: text.encode()})
+    if activate_first and not (folder / ACTIVE).exists():
+        activate(model_id, folder, FIRST, expected=None)
     return Model(model_id, surrogate, design_space, tuple(certificates), full)
 
 
@@ -142,16 +146,6 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED, *, certified
 _MEND = "restore it from the distribution, train again with `rubscreen train`, or activate another model"
 
 
-def active_id(folder: Path = SHIPPED) -> str:
-    """Identifier of the active model."""
-    try:
-        return (folder / _ACTIVE).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError):
-        raise InvalidInput(
-            "models folder", str(folder), "train a model first: it has no active one"
-        ) from None
-
-
 def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
     """Every model of a folder, the active one first."""
     try:
@@ -165,6 +159,24 @@ def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
         except DamagedFile as error:
             entries.append(ModelEntry(name, name == active, {}, f"{error.value}: {error.remedy}"))
     return sorted(entries, key=lambda e: (not e.active, e.id))
+
+
+def _write_files(target: Path, files: dict[str, bytes]) -> None:
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        remedy = f"it cannot be made ({error.strerror}): give another place"
+        raise InvalidInput("models folder", str(target.parent), remedy) from None
+    if not target.exists():
+        with staged(target, "models folder") as beside:
+            beside.mkdir()
+            for name, content in files.items():
+                (beside / name).write_bytes(content)
+    for name, content in files.items():
+        place = target / name
+        if not place.is_file() or place.read_bytes() != content:
+            with staged(place, "models folder") as mended:
+                mended.write_bytes(content)
 
 
 def _identifier(weights: bytes, card: str) -> str:

@@ -6,7 +6,10 @@ what is certified is what is served.
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,9 +36,12 @@ from training.answers import (
 from training.cases import CaseBatch
 from training.certificate import Certificate
 from training.contact_class import contact_class, in_words
+from training.exact_answers import ExactAnswers
 from training.registry import SHIPPED, Model, load_model
 from training.surrogate import PredictedBoundary
 from training.verification_band import VerificationBand
+
+logger = logging.getLogger("rubscreen.training")
 
 # A boundary is answered by the surrogate where its band is narrower than this in log10 K_e (5 %).
 _SURE_BOUNDARY = float(np.log10(1.05))
@@ -45,6 +51,8 @@ _POINT_S, _ARC_VERDICT_S, _ARC_BOUNDARY_S, _PERMANENT_S = 0.02, 0.004, 0.5, 0.02
 _GROWTH_WITH_MODES = 2.6
 # Natural frequency over rotor speed up to which those costs hold; beyond it they grow in proportion.
 _VIBRATIONS = 200.0
+
+Observer = Callable[[ExactAnswers], None]
 
 
 class Screener:
@@ -56,14 +64,27 @@ class Screener:
         None answers exactly only.
     exact_budget_s
         Most exact work one call may ask for, seconds as estimated before it starts.
+    on_exact
+        Told of every exact answer given; what it raises is logged and costs no answer.
     """
 
-    def __init__(self, model: Model | None, exact_budget_s: float = 240.0) -> None:
+    def __init__(
+        self,
+        model: Model | None,
+        exact_budget_s: float = 240.0,
+        on_exact: Observer | None = None,
+    ) -> None:
         self.model = model
         self.exact_budget_s = exact_budget_s
+        self._on_exact = on_exact
 
     @classmethod
-    def default(cls, models_folder: Path = SHIPPED, model_id: str | None = None) -> Screener:
+    def default(
+        cls,
+        models_folder: Path = SHIPPED,
+        model_id: str | None = None,
+        on_exact: Observer | None = None,
+    ) -> Screener:
         """With the active model of a folder, by default the shipped one.
 
         Raises
@@ -71,7 +92,7 @@ class Screener:
         InvalidInput, DamagedFile
             As `load_model`.
         """
-        return cls(load_model(model_id, models_folder))
+        return cls(load_model(model_id, models_folder), on_exact=on_exact)
 
     @property
     def model_id(self) -> str | None:
@@ -137,6 +158,7 @@ class Screener:
                     np.nan if found.unstable_multipliers is None else found.unstable_multipliers,
                     found.wear_lobes,
                 )
+            self._tell(ExactAnswers.from_verdicts, blade, contact, speed[rows], stiffness[rows], stable[rows])
         radius, growth, chatter, error, outside, lobes = columns
         return PointAnswers(
             speed,
@@ -197,6 +219,7 @@ class Screener:
             found = boundary(blade, contact, speed[exact], ke_max, truncation=False)
             critical[exact], chatter[exact] = found.critical_ke, found.chatter_hz
             error[exact] = found.error_estimate
+            self._tell(ExactAnswers.from_crossings, blade, contact, speed[exact], critical[exact], ke_max)
             for i, intervals in zip(np.flatnonzero(exact), found.unstable_ke, strict=True):
                 unstable[i] = intervals
         return BoundaryAnswers(
@@ -244,6 +267,7 @@ class Screener:
             row, col = np.nonzero(exact)
             stable[exact] = verdicts(blade, contact, speed[col], stiffness[row])
             probability[exact] = np.nan
+            self._tell(ExactAnswers.from_verdicts, blade, contact, speed[col], stiffness[row], stable[exact])
         return MapAnswers(
             speed,
             stiffness,
@@ -340,6 +364,14 @@ class Screener:
         if policy == "surrogate":
             return np.zeros(reason.shape, dtype=bool)
         return reason != CONFIDENT
+
+    def _tell(self, made: Callable[..., ExactAnswers], *found: Any) -> None:
+        if self._on_exact is None:
+            return
+        try:
+            self._on_exact(made(*found))
+        except Exception:
+            logger.exception("exact answers could not be passed on")
 
     def _allow(self, count: int, unit_s: float, blade: Blade, speed: np.ndarray) -> None:
         if not count:

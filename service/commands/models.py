@@ -1,4 +1,4 @@
-"""`rubscreen models`: the surrogates there are, and new certificates for them."""
+"""`rubscreen models`: the surrogates there are, which of them is active, new certificates for them."""
 
 from __future__ import annotations
 
@@ -9,25 +9,41 @@ import typer
 from service.commands.options import JsonOption, ModelsOption, UrlOption
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rich.console import Console
     from rich.table import Table
 
+    from training.activation import Activation
     from training.certificate import Certificate
 
-app = typer.Typer(help="The surrogates there are; recalibrate one.", invoke_without_command=True)
+app = typer.Typer(
+    help="The surrogates there are; promote one, roll back, recalibrate.", invoke_without_command=True
+)
 
 
 @app.callback()
 def run(
-    context: typer.Context, models: ModelsOption = None, url: UrlOption = None, json: JsonOption = None
+    context: typer.Context,
+    models: ModelsOption = None,
+    url: UrlOption = None,
+    history: Annotated[bool, typer.Option(help="Also show which model was active when.")] = False,
+    json: JsonOption = None,
 ) -> None:
     """List the surrogates of a folder, or of a running service, the active one marked."""
     if context.invoked_subcommand is not None:
         return
+    from dataclasses import asdict
+
     from rich.table import Table
 
+    from sdm_core.errors import InvalidInput
     from service.commands.outputs import check_writable, console_beside, write_json
+    from training.activation import history as history_of
 
     check_writable(json=json)
+    if history and url:
+        raise InvalidInput("--history", "with --url", "give --models: a service does not tell its history")
     entries = _of_service(url) if url else _of_folder(models)
     console = console_beside(json)
     table = Table(title="Models", title_justify="left", title_style="bold")
@@ -36,8 +52,57 @@ def run(
     for entry in entries:
         table.add_row("active" if entry["active"] else "", entry["id"], *_figures(entry["card"]))
     console.print(table if entries else "no models: train one with `rubscreen train`")
+    changes = history_of(_folder(models)) if history else ()
+    if history:
+        console.print(_history_table(changes))
     if json:
-        write_json(json, {"models": entries}, indent=True)
+        said = {"history": [asdict(change) for change in changes]} if history else {}
+        write_json(json, {"models": entries, **said}, indent=True)
+
+
+@app.command()
+def promote(
+    model: Annotated[str, typer.Argument(metavar="ID", help="The model to become active.")],
+    models: ModelsOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Promote it though it is worse.")] = False,
+) -> None:
+    """Make a surrogate the active one, unless its certificate or its figures are worse than the active one's.
+
+    It is also measured anew on fresh points. A running service takes it up by itself.
+
+    Example: rubscreen models promote 0123456789abcdef --models out/models
+    """
+    from rich.console import Console
+
+    from training.promotion import PromotionRefused
+    from training.promotion import promote as promoted
+
+    folder = _folder(models)
+    try:
+        with Console(stderr=True).status("measuring it on fresh points"):
+            made = promoted(model, folder, force=force)
+    except PromotionRefused as refused:
+        typer.echo(f"rubscreen: {model} is not promoted:", err=True)
+        for reason in refused.reasons:
+            typer.echo(f"  {reason}", err=True)
+        typer.echo("Use --force to promote it all the same", err=True)
+        raise typer.Exit(1) from None
+    if made.was == made.model:
+        typer.echo(f"{made.model} is active already")
+        return
+    for reason in made.overridden:
+        typer.echo(f"forced, although {reason}")
+    typer.echo(f"{made.model} is active in {folder}, after {made.was or 'none'}")
+
+
+@app.command()
+def rollback(models: ModelsOption = None) -> None:
+    """Make the surrogate active again that was before the active one; once more, the one before that."""
+    from training.promotion import rollback as rolled_back
+
+    folder = _folder(models)
+    made = rolled_back(folder)
+    typer.echo(f"{made.model} is active again in {folder}, instead of {made.was}")
 
 
 @app.command()
@@ -50,7 +115,9 @@ def recalibrate(
     points: Annotated[int, typer.Option(help="Independent points of the certificate.", min=20_000)] = 200_000,
     evaluation_points: Annotated[int, typer.Option(help="Further points to evaluate on.", min=1000)] = 20_000,
     threads: Annotated[int, typer.Option(help="Labelling processes.", min=1)] = 2,
-    activate: Annotated[bool, typer.Option(help="Make the result the folder's active model.")] = True,
+    activate: Annotated[
+        bool, typer.Option(help="Make it the folder's active model, unless it is worse than that.")
+    ] = True,
 ) -> None:
     """Give a surrogate a new certificate; its weights and its domain stay.
 
@@ -60,18 +127,15 @@ def recalibrate(
 
     Example: rubscreen models recalibrate --models out/models
     """
-    from pathlib import Path
-
     from service.commands.outputs import progress_bar
     from training.calibration import CalibrationSettings, recalibrate, seed_of
     from training.certificate import CalibrationFailed
-    from training.registry import SHIPPED
 
-    folder = SHIPPED if models is None else Path(models)
+    folder = _folder(models)
     settings = CalibrationSettings(points, evaluation_points, seed_of(model, folder), threads)
     try:
         with progress_bar("recalibrate") as show:
-            made, found = recalibrate(
+            made, found, refused = recalibrate(
                 model,
                 folder,
                 settings,
@@ -86,7 +150,21 @@ def recalibrate(
     console = Console()
     for certificate in found.certificates:
         console.print(certificate_table(certificate))
-    console.print(f"model {made.id} in {folder}{', now active' if activate else ''}")
+    say_written(console, made.id, str(folder), activate, refused)
+
+
+def say_written(
+    console: Console, model_id: str, folder: str, activate: bool, refused: tuple[str, ...]
+) -> None:
+    """Say that a model was written, and whether it is active; one refused ends the command with code 1."""
+    if not refused:
+        console.print(f"model {model_id} in {folder}{', now active' if activate else ''}")
+        return
+    console.print(f"model {model_id} in {folder}, not active: it is worse than the active one")
+    for reason in refused:
+        typer.echo(f"  {reason}", err=True)
+    typer.echo(f"Use `rubscreen models promote {model_id} --force` to activate it all the same", err=True)
+    raise typer.Exit(1)
 
 
 def certificate_table(certificate: Certificate) -> Table:
@@ -114,16 +192,41 @@ def certificate_table(certificate: Certificate) -> Table:
     return table
 
 
-def _of_folder(folder: str | None) -> list[dict[str, Any]]:
+def _folder(models: str | None) -> Path:
+    """The folder named, or the shipped one.
+
+    Raises
+    ------
+    InvalidInput
+        When there is none.
+    """
     from pathlib import Path
 
     from sdm_core.errors import InvalidInput
-    from training.registry import SHIPPED, list_models
+    from training.registry import SHIPPED
 
-    if folder is not None and not Path(folder).is_dir():
-        raise InvalidInput("--models", folder, "give a folder of models")
-    found = list_models(SHIPPED if folder is None else Path(folder))
+    if models is not None and not Path(models).is_dir():
+        raise InvalidInput("--models", models, "give a folder of models")
+    return SHIPPED if models is None else Path(models)
+
+
+def _of_folder(models: str | None) -> list[dict[str, Any]]:
+    from training.registry import list_models
+
+    found = list_models(_folder(models))
     return [{"id": entry.id, "active": entry.active, "card": entry.card} for entry in found]
+
+
+def _history_table(changes: tuple[Activation, ...]) -> Table:
+    from rich.table import Table
+
+    table = Table(title="History, oldest first", title_justify="left", title_style="bold")
+    for heading in ("UTC", "", "active from then on", "before", "forced although"):
+        table.add_column(heading)
+    for change in changes:
+        reasons = "; ".join(change.reasons) if change.forced else ""
+        table.add_row(change.at[:19], change.event, change.model, change.was or "-", reasons)
+    return table
 
 
 def _of_service(url: str) -> list[dict[str, Any]]:
@@ -135,15 +238,20 @@ def _of_service(url: str) -> list[dict[str, Any]]:
 
 def _figures(card: dict[str, Any]) -> tuple[str, str, str, str]:
     """What a card says of itself; a card of another age may say less."""
-    size = f"{card['dataset']['labels']:,} cases" if "labels" in card.get("dataset", {}) else "-"
-    errors, wrongs = [], []
-    for found in card.get("evaluation", {}).values():
-        if "median_boundary_error" in found:
-            errors.append(f"{found['median_boundary_error']:.2%}")
-        if "false_stable" in found.get("auto", {}):
-            wrongs.append(f"{found['auto']['false_stable']} of {found['auto']['answered_stable']:,}")
+    from training.contact_class import PERMANENT
+    from training.held_out import held_out
+
+    dataset, found = card.get("dataset", {}), held_out(card)
+    size = f"{dataset['labels']:,} cases" if isinstance(dataset.get("labels"), int) else "-"
+    errors, wrong = [], []
+    for contact, figures in found.items():
+        where = "" if list(found) == [PERMANENT] else f"{contact}: "
+        if 0.5 in figures.boundary_error:
+            errors.append(f"{where}{figures.boundary_error[0.5]:.2%}")
+        if ("auto", "false_stable") in figures.counts:
+            wrong.append(f"{where}{figures.counts['auto', 'false_stable']}")
     certified = []
-    for found in card.get("certificates", ()):
-        rates = ", ".join(f"{line['alpha']:g}" for line in found["table"])
-        certified.append(f"{found['contact']}: {rates}")
-    return size, ", ".join(errors) or "-", ", ".join(wrongs) or "-", "; ".join(certified) or "-"
+    for certificate in card.get("certificates", ()):
+        rates = ", ".join(f"{line['alpha']:g}" for line in certificate["table"])
+        certified.append(f"{certificate['contact']}: {rates}")
+    return size, "; ".join(errors) or "-", "; ".join(wrong) or "-", "; ".join(certified) or "-"

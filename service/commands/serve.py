@@ -24,13 +24,24 @@ def run(
             show_default=False,
         ),
     ] = None,
+    keep_answers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Keep exact answers here, for `rubscreen train --with-served FOLDER`.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Run the REST service until it is interrupted. Its settings are RUBSCREEN_... environment variables."""
     import uvicorn
 
     from service.app import create_app
+    from service.commands.outputs import check_writable
 
-    settings = settings_from(models)
+    settings = settings_from(models, keep_answers)
+    if settings.served_answers_folder is not None:
+        check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
     app = create_app(settings)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
@@ -48,8 +59,8 @@ def run(
         uvicorn.Server(config).run(sockets=[listening])
 
 
-def settings_from(models: str | None) -> Settings:
-    """The settings of the environment, and a models folder over theirs.
+def settings_from(models: str | None, keep_answers: str | None = None) -> Settings:
+    """The settings of the environment, and folders over theirs.
 
     Raises
     ------
@@ -61,8 +72,10 @@ def settings_from(models: str | None) -> Settings:
     from sdm_core.errors import InvalidInput
     from service.settings import Settings
 
+    folders = {"models_folder": models, "served_answers_folder": keep_answers}
+    given = {name: Path(folder) for name, folder in folders.items() if folder is not None}
     try:
-        return Settings() if models is None else Settings(models_folder=Path(models))
+        return Settings(**given)  # type: ignore[arg-type]
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         name = "RUBSCREEN_" + "_".join(str(part) for part in fault["loc"]).upper()

@@ -51,7 +51,17 @@ def run(
     evaluation_points: Annotated[
         int, typer.Option(help="Further points to evaluate on.", min=1000, rich_help_panel=SIZE)
     ] = 20_000,
-    activate: Annotated[bool, typer.Option(help="Make it the folder's active model.")] = True,
+    with_served: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Also train on what a service answered exactly (rubscreen serve --keep-answers FOLDER).",
+            show_default=False,
+        ),
+    ] = None,
+    activate: Annotated[
+        bool, typer.Option(help="Make it the folder's active model, unless it is worse than that.")
+    ] = True,
     json: Annotated[
         str | None,
         typer.Option(
@@ -67,7 +77,7 @@ def run(
 
     Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
     """
-    from service.commands.models import certificate_table
+    from service.commands.models import certificate_table, say_written
     from service.commands.outputs import check_writable, console_beside, progress_bar, write_json
     from training.certificate import CalibrationFailed
     from training.contact_class import in_words
@@ -91,6 +101,7 @@ def run(
             made = train(
                 Path(folder),
                 settings,
+                served_folder=None if with_served is None else Path(with_served),
                 activate=activate,
                 progress=lambda stage, done, of, remark: show(done, of, f"{stage} {remark}"),
             )
@@ -112,11 +123,16 @@ def run(
         shares = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in one.verified_share.items())
         console.print(f"[dim]{one.labels:,} labels: to verify for the goal {shares}[/dim]")
     console.print(f"[dim]seconds: {', '.join(f'{k} {v:g}' for k, v in made.seconds.items())}[/dim]")
-    console.print(f"model {made.model.id} in {folder}{', now active' if activate else ''}")
     if json:
         evaluations = {contact: found.to_dict() for contact, found in made.evaluations.items()}
-        report = {"model": made.model.id, "seconds": made.seconds, "evaluation": evaluations}
+        report = {
+            "model": made.model.id,
+            "seconds": made.seconds,
+            "evaluation": evaluations,
+            "refused": list(made.refused),
+        }
         write_json(json, report, indent=True)
+    say_written(console, made.model.id, folder, activate, made.refused)
 
 
 def _figures(evaluation: Evaluation, contact: str) -> Table:

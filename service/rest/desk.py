@@ -1,33 +1,21 @@
-"""What the running service holds: its settings, its screener and what is wrong with it, its workers."""
+"""What the running service holds: its settings, its model and what is wrong with it, its workers."""
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from anyio import CapacityLimiter, to_thread
 
-from sdm_core.blade import Blade, ModalState
-from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
+from service.rest.active_model import ActiveModel, Answering, WatchedModel
 from service.rest.errors import NotReady
 from service.rest.limits import WorkQueue
+from service.rest.self_check import self_check
 from service.settings import Settings
 from training.answers import PointAnswers
 from training.registry import SHIPPED, ModelEntry, list_models
-from training.screening import Screener
-
-logger = logging.getLogger("rubscreen.service")
-
-# One mode: the smallest destabilising K_e is 2ξ(1 + ξ)ω² = 790 N/m. The first point lies below it, the
-# second deep inside a lobe.
-_PROBE = Blade("self-check", ("TIP",), 1e-3, [ModalState(0.0, np.array([100.0]), np.array([[1.0]]))])
-_PROBE_CONTACT = ContactConfiguration.at("TIP")
-_PROBE_SPEED_HZ, _PROBE_KE = np.array([40.0, 40.0]), np.array([400.0, 40000.0])
-_PROBE_STABLE = [1.0, 0.0]
+from training.served_answers import ServedAnswers
 
 
 @dataclass(frozen=True)
@@ -36,32 +24,44 @@ class Desk:
 
     Attributes
     ----------
-    screener
-        What answers.
-    fault
-        Why there is no surrogate; None when there is one.
+    model
+        What answers, and what is wrong with the model that should.
     work
         Where answers are computed.
+    kept
+        Where exact answers go for retraining; None where they are not kept.
     """
 
     settings: Settings
-    screener: Answerer
-    fault: InvalidInput | None
+    model: ActiveModel
     work: WorkQueue
+    kept: ServedAnswers | None
     _checking: CapacityLimiter
 
     @classmethod
     def opened(cls, settings: Settings, screener: Answerer | None = None) -> Desk:
-        """The desk with `screener`, or with the active model; a damaged one leaves the exact core."""
-        fault = None
-        if screener is None:
-            try:
-                screener = Screener.default(_folder(settings))
-            except InvalidInput as error:
-                logger.error("no surrogate: %s", error)
-                screener, fault = Screener(None), error
+        """The desk with `screener`, or with the active model of the settings' folder, and what replaces it.
+
+        Raises
+        ------
+        InvalidInput
+            When the folder for exact answers cannot be made.
+        """
+        kept, model = None, ActiveModel(Answering(screener)) if screener is not None else None
+        if model is None:
+            if settings.served_answers_folder is not None:
+                kept = ServedAnswers(settings.served_answers_folder)
+            observer = None if kept is None else kept.keep
+            model = WatchedModel(_folder(settings), settings.models_poll_s, observer)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
-        return cls(settings, screener, fault, work, CapacityLimiter(1))
+        return cls(settings, model, work, kept, CapacityLimiter(1))
+
+    def close(self) -> None:
+        """Stop what still runs, and write what is to be kept."""
+        self.work.close()
+        self.model.close()
+        if self.kept is not None:
+            self.kept.close()
 
     def models(self) -> list[ModelEntry]:
         """The models of the registry, the one that answers marked and first."""
@@ -75,7 +75,12 @@ class Desk:
     @property
     def answering(self) -> str | None:
         """Identifier of the model that answers."""
-        return getattr(self.screener, "model_id", None)
+        return self.model.now.model_id
+
+    @property
+    def fault(self) -> str | None:
+        """Why the model that the folder names does not answer; None where it does."""
+        return None if self.model.fault is None else str(self.model.fault)
 
     def answerer(self, policy: str) -> Answerer:
         """What answers under `policy`.
@@ -86,10 +91,11 @@ class Desk:
             When the surrogate is needed and there is none. Under `auto` too: the exact core alone
             is right but a thousand times slower, which a client should choose, not run into.
         """
-        if self.fault is not None and policy != "exact":
-            remedy = f'{self.fault.remedy}; until then policy "exact" answers'
-            raise NotReady(self.fault.field, self.fault.value, remedy)
-        return self.screener
+        now = self.model.now
+        if now.fault is not None and policy != "exact":
+            remedy = f'{now.fault.remedy}; until then policy "exact" answers'
+            raise NotReady(now.fault.field, now.fault.value, remedy)
+        return now.screener
 
     async def check(self) -> PointAnswers:
         """The service's answer to a question with a known answer.
@@ -103,14 +109,8 @@ class Desk:
         """
         answerer = self.answerer("auto")
 
-        def ask(policy: str) -> PointAnswers:
-            return answerer.points(_PROBE, _PROBE_CONTACT, _PROBE_SPEED_HZ, _PROBE_KE, policy)
-
         for policy in ("exact", "auto"):
-            found = await to_thread.run_sync(ask, policy, limiter=self._checking)
-            if found.stable.tolist() != _PROBE_STABLE:
-                remedy = f"it must be {_PROBE_STABLE}: install the service again"
-                raise NotReady("self_check", f"{found.stable.tolist()} under {policy}", remedy)
+            found = await to_thread.run_sync(self_check, answerer, policy, limiter=self._checking)
         return found
 
 

@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 Source = Literal["surrogate", "exact"]
 Reason = Literal["confident", "near_boundary", "out_of_domain", "requested"]
 
+_LOADING = "The model being loaded while the active one answers; null where there is none."
+_FAULT = "Why the model that the folder names does not answer; null where it does."
+
 
 class CertificateReply(BaseModel):
     """The bound that the surrogate's answers keep."""
@@ -145,6 +148,8 @@ class Ready(BaseModel):
     status: Literal["ready"] = "ready"
     model: str | None
     solver: str
+    loading: str | None = Field(None, description=_LOADING)
+    fault: str | None = Field(None, description=_FAULT)
 
 
 class Model(BaseModel):
@@ -160,3 +165,5 @@ class Models(BaseModel):
     """The surrogates there are."""
 
     models: list[Model]
+    loading: str | None = Field(None, description=_LOADING)
+    fault: str | None = Field(None, description=_FAULT)

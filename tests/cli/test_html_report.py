@@ -217,7 +217,16 @@ def test_the_certificate_says_what_the_card_says():
         "evaluation": {"permanent": {"auto": figures, "alone": alone, "distribution": "reference/1"}},
     }
     said = certificate(card, "auto", CertificateUsed(5e-4, 0.95, "reference/1", 10.0))
-    for part in ("permanent contact", "20,000", "3 of 9,949", "5 of 9,780", "1.4%", "0.0005", "95%", "reference/1"):
+    for part in (
+        "permanent contact",
+        "20,000",
+        "3 of 9,949",
+        "5 of 9,780",
+        "1.4%",
+        "0.0005",
+        "95%",
+        "reference/1",
+    ):
         assert part in said
     assert "77 of 9,949" in certificate(card, "surrogate")
     assert "95%" not in certificate(card, "surrogate")

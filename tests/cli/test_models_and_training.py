@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import pytest
+from nearby_models import nearby
 
-from training import calibration, pipeline, registry
+from training import calibration, pipeline, promotion_check, registry
 from training.certificate import CalibrationFailed
 
 ROTOR = "nasa_rotor_37"
+FOUND = SimpleNamespace(certificates=())
 
 
 @pytest.fixture
@@ -77,10 +80,10 @@ def test_recalibrating_shows_every_rate_and_writes_another_model(rubscreen, own_
 
     monkeypatch.setattr(calibration, "critical_kappa", as_it_says)
     asked = ["models", "recalibrate", model.id, "--models", str(own_models), "--evaluation-points", "1000"]
-    result = rubscreen(*asked, "--points", "20000")
+    result = rubscreen(*asked, "--points", "20000", "--no-activate")
     assert result.exit_code == 0, result.output
-    assert registry.active_id(own_models) != model.id
-    assert registry.active_id(own_models) in result.stdout
+    (made,) = {entry.id for entry in registry.list_models(own_models)} - {model.id}
+    assert made in result.stdout and registry.active_id(own_models) == model.id
     for text in ("20,000 points of reference/1, permanent contact", "0.0005", "not reached"):
         assert text in " ".join(result.stdout.split())
 
@@ -117,3 +120,65 @@ def test_training_into_a_file_is_refused_before_any_work(rubscreen, tmp_path, mo
     result = rubscreen("train", str(blocker / "models"))
     assert result.exit_code == 2
     assert "can be written" in result.stderr
+
+
+def with_nearby(own_models, monkeypatch, **worse):
+    """Another model beside the active one, and no fresh points."""
+    monkeypatch.setattr(promotion_check, "remeasured", lambda *models: promotion_check.Remeasured((), {}))
+    return nearby(own_models, 1.0001, **worse).id
+
+
+def test_a_model_is_promoted_and_rolled_back_and_the_history_shows_it(rubscreen, own_models, monkeypatch):
+    first, other = registry.active_id(own_models), with_nearby(own_models, monkeypatch)
+    there = ["--models", str(own_models)]
+    promoted = rubscreen("models", "promote", other, *there)
+    assert promoted.exit_code == 0 and f"{other} is active" in promoted.stdout
+    assert "active already" in rubscreen("models", "promote", other, *there).stdout
+    assert registry.active_id(own_models) == other
+    back = rubscreen("models", "rollback", *there)
+    assert back.exit_code == 0 and f"{first} is active again" in back.stdout
+    shown = rubscreen("models", *there, "--history", "--json", "-")
+    events = [(e["event"], e["model"]) for e in json.loads(shown.stdout)["history"]]
+    assert events == [("found", first), ("promoted", other), ("rolled back", first)]
+    assert "rolled back" in shown.stderr
+    assert "history" not in json.loads(rubscreen("models", *there, "--json", "-").stdout)
+    nothing = rubscreen("models", "rollback", *there)
+    assert nothing.exit_code == 2 and "none was active before" in nothing.stderr
+
+
+def test_a_worse_model_is_promoted_by_force_alone(rubscreen, own_models, monkeypatch):
+    first, there = registry.active_id(own_models), ["--models", str(own_models)]
+    worse = with_nearby(own_models, monkeypatch, certificates=lambda found: ())
+    refused = rubscreen("models", "promote", worse, *there)
+    assert refused.exit_code == 1 and registry.active_id(own_models) == first
+    assert "certified for nothing" in refused.stderr and "--force" in refused.stderr
+    forced = rubscreen("models", "promote", worse, *there, "--force")
+    assert forced.exit_code == 0 and registry.active_id(own_models) == worse
+    assert "forced, although it is certified for nothing" in forced.stdout
+    assert "certified for nothing" in rubscreen("models", *there, "--history").stdout
+
+
+def test_an_unknown_model_is_not_promoted(rubscreen, own_models):
+    refused = rubscreen("models", "promote", "0" * 16, "--models", str(own_models))
+    assert refused.exit_code == 2 and refused.stderr.count("\n") == 1
+    assert rubscreen("models", "--history", "--url", "http://127.0.0.1:9").exit_code == 2
+
+
+def test_recalibrating_on_fewer_points_leaves_the_active_model_and_says_why(
+    rubscreen, own_models, monkeypatch
+):
+    first = registry.active_id(own_models)
+    monkeypatch.setattr(
+        calibration, "recalibrate", lambda *asked, **more: (registry.load_model(), FOUND, ("it is worse",))
+    )
+    result = rubscreen("models", "recalibrate", "--models", str(own_models), "--points", "20000")
+    assert result.exit_code == 1 and registry.active_id(own_models) == first
+    assert "not active" in result.stdout and "it is worse" in result.stderr and "--force" in result.stderr
+
+
+def test_a_folder_of_answers_is_refused_before_anything_starts(rubscreen, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    refused = rubscreen("serve", "--keep-answers", str(tmp_path / "file"), "--port", "0")
+    assert refused.exit_code == 2 and "--keep-answers" in refused.stderr
+    missing = rubscreen("train", str(tmp_path / "models"), "--with-served", str(tmp_path / "none"))
+    assert missing.exit_code == 2 and "kept its answers in" in missing.stderr

@@ -11,12 +11,13 @@ import pytest
 from sdm_core.errors import DamagedFile
 from sdm_core.version import __version__
 from service.app import create_app
-from service.rest import desk
+from service.rest import active_model
 
 
 def test_a_service_with_a_model_is_alive_and_ready(http):
     assert http.get("/healthz").json() == {"status": "alive", "version": __version__}
-    assert http.get("/readyz").json() == {"status": "ready", "model": "rule-1", "solver": "rule"}
+    said = {"status": "ready", "model": "rule-1", "solver": "rule", "loading": None, "fault": None}
+    assert http.get("/readyz").json() == said
 
 
 def test_a_service_that_answers_wrongly_is_not_ready(own_http, screener, problem):
@@ -36,15 +37,15 @@ def damaged(monkeypatch, screener, serving) -> Iterator[httpx.Client]:
     """A service whose model file is truncated."""
 
     class Damaged:
-        def __new__(cls, model: None):
+        def __new__(cls, model: None, on_exact=None):
             screener.model_id = None
             return screener
 
         @staticmethod
-        def default(models_folder):
+        def default(models_folder, on_exact=None):
             raise DamagedFile("model.safetensors", "512 of 90112 bytes", "install the service again")
 
-    monkeypatch.setattr(desk, "Screener", Damaged)
+    monkeypatch.setattr(active_model, "Screener", Damaged)
     with serving(create_app()) as url, httpx.Client(base_url=url, timeout=20.0) as client:
         yield client
 

@@ -49,9 +49,9 @@ def labels(monkeypatch):
 
 def test_recalibrating_keeps_the_weights_and_leaves_the_old_model_beside_the_new(models, labels):
     old = load_model(folder=models)
-    made, found = recalibrate(None, models, QUICK)
-    again = load_model(folder=models)
-    assert made.id == again.id == active_id(models) != old.id
+    made, found, _ = recalibrate(None, models, QUICK, activate=False)
+    again = load_model(made.id, models)
+    assert made.id != old.id == active_id(models)
     assert load_model(old.id, models).card == old.card
     kept = ("weights_sha256", "dataset", "fit", "design_space", "seed", "architecture")
     assert {k: again.card[k] for k in kept} == {k: old.card[k] for k in kept}
@@ -64,9 +64,17 @@ def test_recalibrating_keeps_the_weights_and_leaves_the_old_model_beside_the_new
 
 
 def test_the_same_calibration_gives_the_same_model(models, labels):
-    first, _ = recalibrate(None, models, QUICK)
-    second, _ = recalibrate(first.id, models, QUICK)
+    first, *_ = recalibrate(None, models, QUICK, activate=False)
+    second, *_ = recalibrate(first.id, models, QUICK, activate=False)
     assert first.id == second.id
+
+
+def test_a_certificate_from_fewer_points_does_not_replace_the_active_one(models, labels):
+    active = active_id(models)
+    made, _, refused = recalibrate(None, models, QUICK)
+    assert active_id(models) == active != made.id
+    assert any("certified on 16,000 points, now 200,000" in reason for reason in refused)
+    assert any("0.0001 is certified now" in reason for reason in refused)
 
 
 def test_a_surrogate_that_errs_on_the_unsafe_side_gets_no_certificate(models, labels):
@@ -93,7 +101,7 @@ def test_a_card_of_the_age_before_certificates_is_refused_until_it_is_recalibrat
     (models / old_id / "card.json").write_text(text)
     with pytest.raises(DamagedFile, match=f"rubscreen models recalibrate {old_id}"):
         load_model(old_id, models)
-    made, _ = recalibrate(old_id, models, QUICK)
+    made, *_ = recalibrate(old_id, models, QUICK, activate=False)
     assert made.card["weights_sha256"] == new.card["weights_sha256"]
     assert "verification_band" not in made.card
     cases = calibration.reference_sample(50, 1).cases
@@ -125,5 +133,7 @@ def test_training_writes_the_card_that_recalibrating_does(tmp_path, labels, monk
     again = load_model(folder=tmp_path / "models")
     assert again.id == made.model.id and again.certificates == made.model.certificates
     assert again.card.keys() == shipped.card.keys()
-    recalibrated, _ = recalibrate(None, shutil.copytree(registry.SHIPPED, tmp_path / "others"), QUICK)
+    assert made.refused == ()
+    others = shutil.copytree(registry.SHIPPED, tmp_path / "others")
+    recalibrated, *_ = recalibrate(None, others, QUICK, activate=False)
     assert recalibrated.card.keys() == again.card.keys()

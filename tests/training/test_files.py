@@ -97,10 +97,10 @@ def test_a_model_reads_back_with_the_same_answers(models):
     assert [(e.id, e.active) for e in list_models(folder)] == [(model.id, True)]
 
 
-def test_writing_the_same_model_twice_gives_one_model(models):
+def test_only_the_first_model_of_a_folder_becomes_active_by_being_written(models):
     folder, model = models
     same = write_model(model.surrogate, DesignSpace(), CERTIFICATES, {"seed": 1}, folder)
-    other = write_model(model.surrogate, DesignSpace(), CERTIFICATES, {"seed": 2}, folder, activate=False)
+    other = write_model(model.surrogate, DesignSpace(), CERTIFICATES, {"seed": 2}, folder)
     assert same.id == model.id != other.id
     assert active_id(folder) == model.id
     assert len(list_models(folder)) == 2

@@ -22,5 +22,6 @@ async def alive() -> Alive:
 @router.get("/readyz", responses=problems(500, 503))
 async def ready(request: Request) -> Ready:
     """The model is loaded, and surrogate and exact core just gave a known answer."""
-    answers = await the_desk(request).check()
-    return Ready(model=answers.model, solver=answers.solver)
+    desk = the_desk(request)
+    answers = await desk.check()
+    return Ready(model=answers.model, solver=answers.solver, loading=desk.model.loading, fault=desk.fault)

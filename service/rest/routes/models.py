@@ -15,8 +15,9 @@ router = APIRouter(prefix="/v1", tags=["models"])
 @router.get("/models", responses=problems(500))
 def models(request: Request) -> Models:  # not async: it reads files
     """The surrogates there are, the one that answers first."""
+    desk = the_desk(request)
     return Models(
-        models=[
-            Model(id=m.id, active=m.active, card=m.card, damage=m.damage) for m in the_desk(request).models()
-        ]
+        models=[Model(id=m.id, active=m.active, card=m.card, damage=m.damage) for m in desk.models()],
+        loading=desk.model.loading,
+        fault=desk.fault,
     )
