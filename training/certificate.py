@@ -11,21 +11,31 @@ from sdm_core.errors import InvalidInput, RubscreenError
 from training.contact_class import ARCS, PERMANENT
 from training.learn_then_test import simultaneous_sequences
 from training.surrogate import PredictedBoundary
-from training.verification_band import FIVE_PERCENT, ONE_PERCENT, VerificationBand
+from training.verification_band import (
+    FIVE_PERCENT,
+    ONE_PERCENT,
+    TEN_PERCENT,
+    TWO_PERCENT,
+    VerificationBand,
+)
 
 # The rates a user may ask for, loosest first, and the candidate bands, safest first. Both are set before any
 # data is seen: they are the order of the tests. In permanent contact the bands end at ten spreads and 5 %,
 # though less may do: real blades are drawn from no distribution, and verifying a few more costs little. With
-# arcs a verdict costs much more than the rest of an answer, and the bands end where few points are left.
+# arcs a verdict costs much more than the rest of an answer, and the bands end where few points are left. What
+# is wrong there by many spreads are blades of which the surrogate is surest, by little in K_e: the least half
+# width shrinks along with the spreads.
 LADDER = (1e-2, 5e-3, 1e-3, 5e-4, 1e-4)
 BANDS = {
     PERMANENT: tuple(
         VerificationBand(s, FIVE_PERCENT)
         for s in (80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0)
     ),
-    ARCS: tuple(
-        VerificationBand(s, ONE_PERCENT)
-        for s in (40.0, 30.0, 25.0, 20.0, 16.0, 13.0, 10.0, 8.0, 7.0, 6.0, 5.0, 4.5, 4.0, 3.5, 3.0)
+    ARCS: (
+        *(VerificationBand(s, TEN_PERCENT) for s in (40.0, 30.0, 25.0, 20.0)),
+        *(VerificationBand(s, FIVE_PERCENT) for s in (20.0, 16.0, 13.0, 10.0, 8.0)),
+        *(VerificationBand(s, TWO_PERCENT) for s in (8.0, 7.0, 6.0, 5.0)),
+        *(VerificationBand(s, ONE_PERCENT) for s in (5.0, 4.0, 3.0)),
     ),
 }
 CONFIDENCE = 0.95
@@ -90,8 +100,8 @@ class Certificate:
         How many calibration points, and what they were drawn with.
     table
         Lines by alpha, loosest first.
-    candidates
-        Bands that were tested, in spreads, in their order.
+    candidates, least_half_widths
+        Bands that were tested, in their order: in spreads, and at least in log10 K_e.
     not_reached
         Rates asked for that no band was proven to keep.
     """
@@ -104,6 +114,7 @@ class Certificate:
     table: tuple[CertifiedBand, ...]
     candidates: tuple[float, ...]
     not_reached: tuple[float, ...] = ()
+    least_half_widths: tuple[float, ...] = ()
 
     @property
     def alphas(self) -> tuple[float, ...]:
@@ -132,7 +143,8 @@ class Certificate:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Certificate:
         """From the model card."""
-        lists = {"candidates": tuple(data["candidates"]), "not_reached": tuple(data["not_reached"])}
+        names = ("candidates", "not_reached", "least_half_widths")
+        lists = {name: tuple(data.get(name, ())) for name in names}
         return cls(**{**data, **lists, "table": tuple(CertifiedBand(**line) for line in data["table"])})
 
 
@@ -175,7 +187,15 @@ def certify(
     )
     missed = tuple(alpha for alpha, held in zip(alphas, counts, strict=True) if not held)
     return Certificate(
-        distribution, contact, confidence, len(ke), seed, table, tuple(b.spreads for b in bands), missed
+        distribution,
+        contact,
+        confidence,
+        len(ke),
+        seed,
+        table,
+        tuple(band.spreads for band in bands),
+        missed,
+        tuple(band.least_half_width for band in bands),
     )
 
 

@@ -101,7 +101,6 @@ def fit(
     *,
     seed: int,
     space: DesignSpace | None = None,
-    start: Surrogate | None = None,
     progress: Progress | None = None,
 ) -> Surrogate:
     """Fit a surrogate to exact first crossings.
@@ -114,8 +113,6 @@ def fit(
         Cases and κ of their first crossings (infinite: none, NaN: not known), m each.
     space
         Says up to which κ crossings were looked for.
-    start
-        A surrogate to go on from, its scaling of inputs included; left out, random weights.
     progress
         Called with (epoch, epochs, loss).
     """
@@ -123,11 +120,8 @@ def fit(
     data = Prepared.of(cases, kappa, space or DesignSpace(), device)
     torch.manual_seed(seed)
     network = BoundaryNetwork(settings.architecture)
-    if start is None:
-        network.mean.copy_(data.inputs.mean(dim=0))
-        network.scale.copy_(data.inputs.std(dim=0).clamp(min=1e-3))
-    else:
-        network.load_state_dict(start.network.state_dict())
+    network.mean.copy_(data.inputs.mean(dim=0))
+    network.scale.copy_(data.inputs.std(dim=0).clamp(min=1e-3))
     train_network(network.to(device), data, settings, seed=seed, progress=progress)
     return Surrogate(network.cpu(), settings.architecture)
 

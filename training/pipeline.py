@@ -218,7 +218,6 @@ def _fitted(
         settings,
         seed=s.seed,
         space=s.design_space,
-        start=learner.surrogate if settings.epochs == s.round_epochs else None,
         progress=lambda epoch, of, loss: progress(stage, epoch, of, f"loss {loss:.4f}"),
     )
 

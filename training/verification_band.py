@@ -8,7 +8,9 @@ import numpy as np
 
 from training.surrogate import PredictedBoundary
 
-FIVE_PERCENT, ONE_PERCENT = float(np.log10(1.05)), float(np.log10(1.01))
+ONE_PERCENT, TWO_PERCENT, FIVE_PERCENT, TEN_PERCENT = (
+    float(np.log10(1 + p)) for p in (0.01, 0.02, 0.05, 0.1)
+)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ def run(
         str | None,
         typer.Option(
             metavar="SPEEDSxSTIFFNESSES",
-            help="Points of the map. Left out: 200x200, or 50x50 with arcs or an engagement, "
+            help="Points of the map. Left out: 200x200, or 50x50 with an engagement, "
             "which the exact core answers.",
             show_default=False,
         ),
@@ -83,7 +83,7 @@ def run(
     chosen = blade_from(blade)
     contact = contact_from(nodes, weights, arcs, engagement, chosen)
     low, high = speeds_from(speed, chosen)
-    shape = grid_from(grid or ("200x200" if contact.permanent else "50x50"))
+    shape = grid_from(grid or ("50x50" if contact.smooth else "200x200"))
     check_stiffnesses(ke_max, ke_liner)
     lined = png is not None and contact.permanent
     check_work(chosen, contact, (low, high), ke_max, here=url is None, every_lobe=lined)

@@ -51,7 +51,7 @@ def run(
         str | None,
         typer.Option(
             metavar="SPEEDSxSTIFFNESSES",
-            help="Points of each map. Left out: 100x100, or 50x50 with arcs or an engagement.",
+            help="Points of each map. Left out: 100x100, or 50x50 with an engagement.",
             show_default=False,
         ),
     ] = None,

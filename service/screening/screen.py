@@ -20,8 +20,8 @@ from training.answers import EXACT, BoundaryAnswers, MapAnswers
 
 # [SBL] section 4: K_e up to 2.5e4 N/m covers the cutting forces seen in experiments.
 KE_MAX = 2.5e4
-# With arcs the exact core answers every point of a map, at some hundredths of a second each.
-MAP_SHAPE, MAP_SHAPE_WITH_ARCS = (100, 100), (50, 50)
+# With smooth engagement the exact core answers every point of a map, at some hundredths of a second each.
+MAP_SHAPE, MAP_SHAPE_SMOOTH = (100, 100), (50, 50)
 STABLE, UNSTABLE, UNDECIDED = "stable", "unstable at some speed", "not decided"
 
 
@@ -182,7 +182,7 @@ def screen(
     ke_max, ke_liner
         Largest K_e looked at and the liner's, N/m.
     map_shape
-        Speeds and stiffnesses of each map; None is 100 × 100, or 50 × 50 with arcs of contact.
+        Speeds and stiffnesses of each map; None is 100 × 100, or 50 × 50 with smooth engagement.
     policy
         Of the maps. Lobe tips are exact whatever it is.
     sweep_policy
@@ -213,7 +213,7 @@ def screen(
     for i, (blade, name, contact, speeds) in enumerate(jobs):
         if progress is not None:
             progress(i, len(jobs), f"{blade.name}, {name}")
-        columns, rows = map_shape or (MAP_SHAPE if contact.permanent else MAP_SHAPE_WITH_ARCS)
+        columns, rows = map_shape or (MAP_SHAPE_SMOOTH if contact.smooth else MAP_SHAPE)
         speed_hz = evenly_spaced(*speeds, columns)
         sweep = lobe_grid(blade, contact, speed_hz, ke_max)
         boundary, tips = searched(

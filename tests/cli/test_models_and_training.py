@@ -107,8 +107,8 @@ def test_training_options_reach_the_pipeline(rubscreen, tmp_path, monkeypatch):
         raise CalibrationFailed("enough")
 
     monkeypatch.setattr(pipeline, "train", stop)
-    rubscreen("train", str(tmp_path), "--seed", "7", "--designs", "128", "--epochs", "3", "--no-activate")
-    assert (seen["settings"].seed, seen["settings"].designs, seen["settings"].fit.epochs) == (7, 128, 3)
+    rubscreen("train", str(tmp_path), "--seed", "7", "--cases", "4096", "--epochs", "3", "--no-activate")
+    assert (seen["settings"].seed, seen["settings"].first_cases, seen["settings"].fit.epochs) == (7, 4096, 3)
     assert seen["folder"] == tmp_path
     assert seen["activate"] is False
 
@@ -122,38 +122,45 @@ def test_training_into_a_file_is_refused_before_any_work(rubscreen, tmp_path, mo
     assert "can be written" in result.stderr
 
 
+@pytest.fixture
+def twins(tmp_path):
+    """A folder with one model, certified for permanent contact."""
+    nearby(tmp_path / "twins")
+    return tmp_path / "twins"
+
+
 def with_nearby(own_models, monkeypatch, **worse):
     """Another model beside the active one, and no fresh points."""
     monkeypatch.setattr(promotion_check, "remeasured", lambda *models: promotion_check.Remeasured((), {}))
     return nearby(own_models, 1.0001, **worse).id
 
 
-def test_a_model_is_promoted_and_rolled_back_and_the_history_shows_it(rubscreen, own_models, monkeypatch):
-    first, other = registry.active_id(own_models), with_nearby(own_models, monkeypatch)
-    there = ["--models", str(own_models)]
+def test_a_model_is_promoted_and_rolled_back_and_the_history_shows_it(rubscreen, twins, monkeypatch):
+    first, other = registry.active_id(twins), with_nearby(twins, monkeypatch)
+    there = ["--models", str(twins)]
     promoted = rubscreen("models", "promote", other, *there)
     assert promoted.exit_code == 0 and f"{other} is active" in promoted.stdout
     assert "active already" in rubscreen("models", "promote", other, *there).stdout
-    assert registry.active_id(own_models) == other
+    assert registry.active_id(twins) == other
     back = rubscreen("models", "rollback", *there)
     assert back.exit_code == 0 and f"{first} is active again" in back.stdout
     shown = rubscreen("models", *there, "--history", "--json", "-")
     events = [(e["event"], e["model"]) for e in json.loads(shown.stdout)["history"]]
-    assert events == [("found", first), ("promoted", other), ("rolled back", first)]
+    assert events == [("first", first), ("promoted", other), ("rolled back", first)]
     assert "rolled back" in shown.stderr
     assert "history" not in json.loads(rubscreen("models", *there, "--json", "-").stdout)
     nothing = rubscreen("models", "rollback", *there)
     assert nothing.exit_code == 2 and "none was active before" in nothing.stderr
 
 
-def test_a_worse_model_is_promoted_by_force_alone(rubscreen, own_models, monkeypatch):
-    first, there = registry.active_id(own_models), ["--models", str(own_models)]
-    worse = with_nearby(own_models, monkeypatch, certificates=lambda found: ())
+def test_a_worse_model_is_promoted_by_force_alone(rubscreen, twins, monkeypatch):
+    first, there = registry.active_id(twins), ["--models", str(twins)]
+    worse = with_nearby(twins, monkeypatch, certificates=lambda found: ())
     refused = rubscreen("models", "promote", worse, *there)
-    assert refused.exit_code == 1 and registry.active_id(own_models) == first
+    assert refused.exit_code == 1 and registry.active_id(twins) == first
     assert "certified for nothing" in refused.stderr and "--force" in refused.stderr
     forced = rubscreen("models", "promote", worse, *there, "--force")
-    assert forced.exit_code == 0 and registry.active_id(own_models) == worse
+    assert forced.exit_code == 0 and registry.active_id(twins) == worse
     assert "forced, although it is certified for nothing" in forced.stdout
     assert "certified for nothing" in rubscreen("models", *there, "--history").stdout
 
