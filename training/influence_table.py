@@ -11,7 +11,7 @@ from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.sensitivity import Gradient
 from training.answers import SensitivityAnswers
 from training.boundary_gradient import boundary_gradients
-from training.first_crossings import FirstCrossings
+from training.doubt import FirstCrossings
 from training.surrogate import Surrogate
 
 LARGEST_LEARNED_SHARE = 0.05

@@ -25,7 +25,6 @@ from training.answers import (
     CONFIDENT,
     EXACT,
     LEARNED_SLOPE,
-    NEAR_BOUNDARY,
     OUT_OF_DOMAIN,
     POLICIES,
     REQUESTED,
@@ -39,6 +38,7 @@ from training.answers import (
 from training.cases import CaseBatch
 from training.certificate import Certificate
 from training.contact_class import contact_class, in_words
+from training.doubt import FirstCrossings, doubt_points, first_crossings
 from training.exact_answers import ExactAnswers
 from training.exact_budget import (
     ARC_BOUNDARY_S,
@@ -48,7 +48,6 @@ from training.exact_budget import (
     POINT_S,
     check_budget,
 )
-from training.first_crossings import FirstCrossings, beyond_reach, first_crossings
 from training.influence_table import InfluenceTable
 from training.registry import SHIPPED, Model, load_model
 from training.surrogate import PredictedBoundary
@@ -143,7 +142,7 @@ class Screener:
         else:
             probability = predicted.unstable_probability(stiffness)
             stable = (probability < 0.5).astype(float)
-            self._mark(reason, predicted, stiffness, band, policy)
+            doubt_points(predicted, stiffness, reason, band, policy)
         exact = self._exact_rows(reason, policy)
         self._allow(exact.sum(), POINT_S, blade, speed)
         columns = np.full((6, len(speed)), np.nan)
@@ -274,7 +273,7 @@ class Screener:
             column = stiffness[:, None]
             probability = predicted.unstable_probability(column)
             stable = (probability < 0.5).astype(float)
-            self._mark(reason, predicted, column, band, policy)
+            doubt_points(predicted, column, reason, band, policy)
         exact = self._exact_rows(reason, policy)
         if contact.permanent:  # one solve decides a whole column
             self._allow(exact.any(axis=0).sum(), PERMANENT_S, blade, speed)
@@ -372,26 +371,6 @@ class Screener:
             np.log10(self.model.design_space.largest_ke(cases[~outside])),
         )
         return PredictedBoundary(*columns), reason
-
-    def _mark(
-        self,
-        reason: np.ndarray,
-        predicted: PredictedBoundary,
-        ke: np.ndarray,
-        band: VerificationBand,
-        policy: str,
-    ) -> None:
-        """Write into `reason` which points the surrogate is not sure of, or knows nothing of."""
-        with np.errstate(divide="ignore"):
-            beyond = np.log10(ke) > predicted.log_reach
-        if policy == "auto":
-            reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
-            reason[(reason == CONFIDENT) & band.verify(predicted, ke)] = NEAR_BOUNDARY
-        elif beyond.any():
-            at = tuple(np.argwhere(beyond)[0])
-            worst = float(np.broadcast_to(ke, beyond.shape)[at])
-            reach = float(np.broadcast_to(predicted.log_reach, beyond.shape)[at])
-            raise InvalidInput("ke", worst, beyond_reach(reach))
 
     def _exact_rows(self, reason: np.ndarray, policy: str) -> np.ndarray:
         if policy == "surrogate":

@@ -1,4 +1,4 @@
-"""The surrogate's first crossings up to a K_e, and where it is not sure of them."""
+"""Where the surrogate is not sure of its own answer, or knows nothing of it."""
 
 from __future__ import annotations
 
@@ -76,11 +76,37 @@ def first_crossings(
         reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
     elif beyond.any():
         worst = int(np.argmax(beyond))
-        raise InvalidInput("ke_max", ke_max, beyond_reach(reach[worst], speed_hz[worst]))
+        raise InvalidInput("ke_max", ke_max, _beyond_reach(reach[worst], speed_hz[worst]))
     return FirstCrossings(critical, error, reason, certificate)
 
 
-def beyond_reach(log_reach: float, speed_hz: float | None = None) -> str:
+def doubt_points(
+    predicted: PredictedBoundary,
+    ke: np.ndarray,
+    reason: np.ndarray,
+    band: VerificationBand,
+    policy: str,
+) -> None:
+    """Write into `reason` which points at K_e the surrogate is not sure of, or knows nothing of.
+
+    Raises
+    ------
+    InvalidInput
+        Under "surrogate", where it knows nothing.
+    """
+    with np.errstate(divide="ignore"):
+        beyond = np.log10(ke) > predicted.log_reach
+    if policy == "auto":
+        reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
+        reason[(reason == CONFIDENT) & band.verify(predicted, ke)] = NEAR_BOUNDARY
+    elif beyond.any():
+        at = tuple(np.argwhere(beyond)[0])
+        worst = float(np.broadcast_to(ke, beyond.shape)[at])
+        reach = float(np.broadcast_to(predicted.log_reach, beyond.shape)[at])
+        raise InvalidInput("ke", worst, _beyond_reach(reach))
+
+
+def _beyond_reach(log_reach: float, speed_hz: float | None = None) -> str:
     """The remedy where a K_e lies above what the surrogate learned, log10 N/m."""
     at = "" if speed_hz is None else f" at {speed_hz:g} Hz"
     return f"the surrogate knows this blade up to {10.0**log_reach:.3g} N/m{at}; use policy auto or exact"
