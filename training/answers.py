@@ -11,7 +11,7 @@ from sdm_core.blade_sensitivity import Influence
 SURROGATE, EXACT = "surrogate", "exact"
 CONFIDENT, NEAR_BOUNDARY = "confident", "near_boundary"
 OUT_OF_DOMAIN, REQUESTED = "out_of_domain", "requested"
-LEARNED_SLOPE = "learned_slope"  # of derivatives alone: they rest too much on what was learned
+UNSURE_SLOPE = "unsure_slope"  # of derivatives alone: the boundary itself is confident
 POLICIES = ("auto", "surrogate", "exact")
 
 

@@ -11,11 +11,13 @@ from torch import Tensor
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.sensitivity import Gradient
-from training.cases import ARCS, CaseBatch, order_of_modes
-from training.features import CaseTensors, features
+from training.cases import ARCS, MODES, CaseBatch, order_of_modes
+from training.features import MODE_FEATURES, CaseTensors, Features, features
 from training.surrogate import Surrogate
 
 _BATCH = 4096
+_LOBES = ("log_nearest_lobe", "log_other_lobe", "log_flip")
+_SAME_LOBE = 1e-5  # of log10 K_e, in single precision
 _LN10 = float(np.log(10.0))
 
 Slopes = dict[str, np.ndarray]
@@ -36,11 +38,15 @@ class PredictedGradients:
         How much of the gradient the network adds to that of the exact lobe it corrects: the ratio of their
         lengths, relative changes of frequencies, damping and speed taken; shape (m,). The error
         of a gradient grows with it (decision 15).
+    lobe_gap
+        log10 of the next lowest lobe over the lowest, shape (m,). Where two are equally low the boundary has
+        a kink, and its gradient jumps.
     """
 
     critical_ke: np.ndarray
     gradients: tuple[Gradient, ...]
     learned_share: np.ndarray
+    lobe_gap: np.ndarray
 
 
 def boundary_gradients(
@@ -64,24 +70,27 @@ def boundary_gradients(
     cases = CaseBatch.from_blade(blade, contact, speed_hz)
     order = order_of_modes(blade.at_speeds(speed_hz)[0])
     arcs = np.zeros((0, 2)) if contact.permanent else np.array(contact.arcs, dtype=float)
-    ke, gradients, share = [], [], []
+    ke, gradients, share, gap = [], [], [], []
     for start in range(0, len(cases), _BATCH):
         batch = cases[start : start + _BATCH]
         tensors = CaseTensors.of(batch)
         if len(arcs):
             tensors = replace(tensors, arcs=_padded(arcs, len(batch)))
-        value, of_lobe, learned = _slopes(surrogate, tensors)
+        value, of_lobe, learned, found = _slopes(surrogate, tensors)
         total = {name: of_lobe[name] + learned[name] for name in of_lobe}
         share.append(_length(learned, batch) / _length(total, batch))
+        gap.append(_lobe_gap(found))
         ke.append(value)
         for k in range(len(batch)):
             of_case = {name: _LN10 * value[k] * slope[k] for name, slope in total.items()}
             gradients.append(_gradient(of_case, order[start + k], len(arcs)))
-    return PredictedGradients(np.concatenate(ke), tuple(gradients), np.concatenate(share))
+    return PredictedGradients(
+        np.concatenate(ke), tuple(gradients), np.concatenate(share), np.concatenate(gap)
+    )
 
 
-def _slopes(surrogate: Surrogate, cases: CaseTensors) -> tuple[np.ndarray, Slopes, Slopes]:
-    """K_e, N/m, and the derivatives of log10 K_e by tensor: of the lowest lobe, and of its correction."""
+def _slopes(surrogate: Surrogate, cases: CaseTensors) -> tuple[np.ndarray, Slopes, Slopes, Features]:
+    """K_e, N/m; the derivatives of log10 K_e by tensor, of the lobe and of its correction; features."""
     names = [f.name for f in fields(cases)]
     leaves = [getattr(cases, name).requires_grad_() for name in names]
     found = features(cases)
@@ -99,7 +108,17 @@ def _slopes(surrogate: Surrogate, cases: CaseTensors) -> tuple[np.ndarray, Slope
             for name, leaf, by in zip(names, leaves, found, strict=True)
         }
 
-    return ke, slopes(log_lobe), slopes(correction)
+    return ke, slopes(log_lobe), slopes(correction), found
+
+
+def _lobe_gap(found: Features) -> np.ndarray:
+    """How far the next lowest lobe of any mode lies above the lowest, in log10 K_e, shape (m,)."""
+    by_mode = found.inputs.detach().numpy()[:, : MODES * len(MODE_FEATURES)]
+    by_mode = by_mode.reshape(-1, len(MODE_FEATURES), MODES)
+    lobes = by_mode[:, [MODE_FEATURES.index(name) for name in _LOBES]].reshape(len(by_mode), -1)
+    above = lobes - lobes.min(axis=1, keepdims=True)
+    # With arcs one lobe may have been found from two guesses.
+    return np.where(above > _SAME_LOBE, above, np.inf).min(axis=1)
 
 
 def _length(slopes: Slopes, cases: CaseBatch) -> np.ndarray:

@@ -13,9 +13,12 @@ from training.answers import SensitivityAnswers
 from training.boundary_gradient import boundary_gradients
 from training.doubt import FirstCrossings
 from training.surrogate import Surrogate
+from training.verification_band import FIVE_PERCENT
 
+# A gradient goes to the exact core (decision 15) where the network adds more than this to the
+# gradient of the lobe it corrects, or two lobes lie within 5 %.
 LARGEST_LEARNED_SHARE = 0.05
-"""Beyond this a gradient goes to the exact core: measured in decision 15."""
+LEAST_LOBE_GAP = FIVE_PERCENT
 
 
 class InfluenceTable:
@@ -43,7 +46,7 @@ class InfluenceTable:
 
         Returns
         -------
-        Which of its gradients rest too much on what was learned, shape (m,).
+        Which of its gradients it is not sure of, shape (m,).
         """
         doubtful = np.zeros(len(self._speed_hz), dtype=bool)
         at = np.flatnonzero(rows & ~np.isnan(self._critical))
@@ -52,7 +55,7 @@ class InfluenceTable:
         found = boundary_gradients(surrogate, self._blade, self._contact, self._speed_hz[at])
         for i, ke, gradient in zip(at.tolist(), found.critical_ke, found.gradients, strict=True):
             self._rows[i] = self._influences(i, gradient, float(ke))
-        doubtful[at] = ~(found.learned_share <= LARGEST_LEARNED_SHARE)
+        doubtful[at] = ~(found.learned_share <= LARGEST_LEARNED_SHARE) | (found.lobe_gap < LEAST_LOBE_GAP)
         return doubtful
 
     def solve(self, rows: np.ndarray, ke_max: float) -> np.ndarray:

@@ -24,11 +24,11 @@ from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from training.answers import (
     CONFIDENT,
     EXACT,
-    LEARNED_SLOPE,
     OUT_OF_DOMAIN,
     POLICIES,
     REQUESTED,
     SURROGATE,
+    UNSURE_SLOPE,
     BoundaryAnswers,
     CertificateUsed,
     MapAnswers,
@@ -233,7 +233,7 @@ class Screener:
         """What moves the first crossing at each speed, parameter by parameter; raises as `points`.
 
         Under "auto" the surrogate answers, by automatic differentiation, where it would answer `boundary`,
-        unless its gradient rests too much on what was learned. Smooth engagement is refused: it has none.
+        unless it is not sure of its gradient (`training.influence_table`). Smooth engagement has no gradient.
         """
         speed = speeds("speed_hz", speed_hz)
         ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
@@ -243,7 +243,7 @@ class Screener:
         if self.model is not None:
             doubtful = table.predict(self.model.surrogate, ~self._exact_rows(decided.reason, policy))
             if policy == "auto":
-                decided.reason[doubtful] = LEARNED_SLOPE
+                decided.reason[doubtful] = UNSURE_SLOPE
         exact = self._exact_rows(decided.reason, policy)
         if exact.any():
             unit = PERMANENT_S if contact.permanent else ARC_BOUNDARY_S

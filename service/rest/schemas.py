@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Source = Literal["surrogate", "exact"]
 Reason = Literal["confident", "near_boundary", "out_of_domain", "requested"]
-SlopeReason = Literal["confident", "near_boundary", "learned_slope", "out_of_domain", "requested"]
+SlopeReason = Literal["confident", "near_boundary", "unsure_slope", "out_of_domain", "requested"]
 
 _LOADING = "The model being loaded while the active one answers; null where there is none."
 _FAULT = "Why the model that the folder names does not answer; null where it does."
