@@ -21,6 +21,7 @@ MEASUREMENTS = {
     "architectures": "benchmarks.architectures",
     "surrogate_speed": "benchmarks.surrogate_speed",
     "learning": "benchmarks.learning_curve",
+    "gradients": "benchmarks.gradients",
     "speed": "benchmarks.map_speed",
 }
 

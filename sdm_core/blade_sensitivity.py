@@ -8,8 +8,10 @@ import numpy as np
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
+from sdm_core.crossings import Crossings
 from sdm_core.errors import InvalidInput
-from sdm_core.floquet.arc_boundary import arc_crossings
+from sdm_core.floquet.arc_boundary import arc_crossings, boundaries_with_arcs
+from sdm_core.interruption import checkpoint
 from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.sensitivity import Gradient, critical_ke_sensitivity, multiplier_sensitivity
@@ -83,7 +85,7 @@ def growth_sensitivities(
     solution = stability(problem)
     found = multiplier_sensitivity(problem, solution.multiplier)
     growth = found.growth
-    rows = _influences(problem, blade, contact, growth, 1.0)
+    rows = influences_of(problem, blade, contact, growth, 1.0)
     moved = float(growth.ke)
     rows.append(Influence("cutting stiffness", "N/m", problem.ke, moved, problem.ke * moved))
     return BladeSensitivity(
@@ -124,24 +126,109 @@ def critical_ke_sensitivities(
     )
     if len(crossing.ke) == 0:
         raise InvalidInput("ke_max", ke_max, f"raise it: no crossing up to there at {speed_hz:g} Hz")
+    return _at_first(crossing, problem, blade, contact)
+
+
+def boundary_sensitivities(
+    blade: Blade,
+    contact: ContactConfiguration,
+    speed_hz: np.ndarray,
+    ke_max: float,
+    *,
+    extrapolate: bool = False,
+) -> list[BladeSensitivity]:
+    """First critical K_e at each of many rotor speeds, and its derivatives.
+
+    No crossing up to `ke_max` is a value of NaN with an error of 0, or infinite where that is not proven.
+    Derivatives are NaN there, and where they cannot be had: at a double multiplier, or in too strong a
+    contact. `simple` says so.
+
+    Parameters
+    ----------
+    speed_hz
+        Hz, shape (m,).
+    ke_max
+        N/m.
+
+    Raises
+    ------
+    InvalidInput
+        For unusable input, smooth engagement included.
+    """
+    check_differentiable(contact)
+    number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+    problems = RubbingBlade.at_speeds(blade, contact, speed_hz, extrapolate=extrapolate)
+    crossings = (
+        permanent_crossings(problems, ke_max) if contact.permanent else boundaries_with_arcs(problems, ke_max)
+    )
+    out = []
+    for problem, crossing in zip(problems, crossings, strict=True):
+        checkpoint()
+        try:
+            found = _at_first(crossing, problem, blade, contact) if len(crossing.ke) else None
+        except InvalidInput:  # not about what was given, which has been checked
+            found = None
+        out.append(found or _without_derivatives(crossing, problem, blade, contact))
+    return out
+
+
+def check_differentiable(contact: ContactConfiguration) -> None:
+    """Raise `InvalidInput` where engagement is smooth, for which there are no derivatives."""
+    if contact.smooth:
+        raise InvalidInput(
+            "contact.engagement", "smooth", "give arcs, or neither: derivatives need constant γ"
+        )
+
+
+def _at_first(
+    crossing: Crossings, problem: RubbingBlade, blade: Blade, contact: ContactConfiguration
+) -> BladeSensitivity:
     problem, chatter_hz = problem.with_ke(float(crossing.ke[0])), float(crossing.frequency_hz[0])
-    found = critical_ke_sensitivity(problem, np.exp(2j * np.pi * chatter_hz / speed_hz))
+    found = critical_ke_sensitivity(problem, np.exp(2j * np.pi * chatter_hz / problem.speed_hz))
     return BladeSensitivity(
         found.ke,
-        float(crossing.error_estimate[0]) if crossing.proven else np.inf,
+        _error_of(crossing),
         found.multiplier,
         chatter_hz,
         found.critical_ke,
-        tuple(_influences(problem, blade, contact, found.critical_ke, found.ke)),
+        tuple(influences_of(problem, blade, contact, found.critical_ke, found.ke)),
         found.condition,
         found.simple,
     )
 
 
-def _influences(
+def _without_derivatives(
+    crossing: Crossings, problem: RubbingBlade, blade: Blade, contact: ContactConfiguration
+) -> BladeSensitivity:
+    there = len(crossing.ke) > 0
+    ke, chatter_hz = (crossing.ke[0], crossing.frequency_hz[0]) if there else (np.nan, np.nan)
+    nothing = Gradient.unknown(problem)
+    rows = tuple(influences_of(problem, blade, contact, nothing, np.nan))
+    multiplier = complex(np.exp(2j * np.pi * chatter_hz / problem.speed_hz))
+    error = _error_of(crossing)
+    return BladeSensitivity(float(ke), error, multiplier, float(chatter_hz), nothing, rows, np.inf, False)
+
+
+def _error_of(crossing: Crossings) -> float:
+    if not crossing.proven:
+        return np.inf
+    return float(crossing.error_estimate[0]) if len(crossing.ke) else 0.0
+
+
+def influences_of(
     problem: RubbingBlade, blade: Blade, contact: ContactConfiguration, gradient: Gradient, scale: float
 ) -> list[Influence]:
-    """A gradient parameter by parameter; `scale` is what relative changes are relative to."""
+    """A gradient parameter by parameter in the user's units.
+
+    Parameters
+    ----------
+    problem
+        The blade in contact at a rotor speed; its K_e is not used.
+    gradient
+        Of growth or of critical K_e, with respect to `problem`.
+    scale
+        What relative changes are relative to: K_e, or 1.
+    """
     speed, omega, frozen = problem.speed_hz, problem.omega, float(gradient.speed_hz)
     shape = blade.at_speeds(np.array([speed]), extrapolate=True)[1][0]
     weight = contact.weight_vector(blade.tip_nodes)

@@ -8,7 +8,7 @@ import numpy as np
 
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, SensitivityAnswers
 
 
 class Answerer(Protocol):
@@ -40,6 +40,18 @@ class Answerer(Protocol):
         alpha: float | None = None,
     ) -> BoundaryAnswers:
         """The first crossing at each speed."""
+        ...
+
+    def sensitivities(
+        self,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: np.ndarray,
+        ke_max: float,
+        policy: str = "auto",
+        alpha: float | None = None,
+    ) -> SensitivityAnswers:
+        """What moves the first crossing at each speed."""
         ...
 
     def map(

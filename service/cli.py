@@ -9,7 +9,19 @@ from typer.core import TyperGroup
 
 from sdm_core.errors import InvalidInput, RubscreenError
 from sdm_core.version import __version__
-from service.commands import assess, blade, boundary, demo, map, models, paper, screen, serve, train
+from service.commands import (
+    assess,
+    blade,
+    boundary,
+    demo,
+    map,
+    models,
+    paper,
+    screen,
+    sensitivities,
+    serve,
+    train,
+)
 
 
 class _Commands(TyperGroup):
@@ -55,7 +67,7 @@ def rubscreen(
     """Screen turbomachinery blades for rub-induced instability."""
 
 
-for command in (demo, serve, screen, assess, map, boundary, train, paper):
+for command in (demo, serve, screen, assess, map, boundary, sensitivities, train, paper):
     app.command(command.__name__.rpartition(".")[2])(command.run)
 
 app.add_typer(blade.app, name="blade")

@@ -15,7 +15,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile, RubscreenError
 from service.rest import replies
 from service.rest.errors import PROBLEM_JSON
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, SensitivityAnswers
 
 Json = dict[str, Any]
 T = TypeVar("T")
@@ -112,6 +112,25 @@ class Client:
         question = _question(blade, contact, policy, alpha, speed_hz=speed, ke_max=ke_max)
         return self._ask(
             "POST", "/v1/boundary", question, lambda reply: replies.boundary_from_dict(reply, speed, ke_max)
+        )
+
+    def sensitivities(
+        self,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: np.ndarray,
+        ke_max: float,
+        policy: str = "auto",
+        alpha: float | None = None,
+    ) -> SensitivityAnswers:
+        """What moves the first crossings (``POST /v1/sensitivities``); raises like `points`."""
+        speed = np.asarray(speed_hz, dtype=float)
+        question = _question(blade, contact, policy, alpha, speed_hz=speed, ke_max=ke_max)
+        return self._ask(
+            "POST",
+            "/v1/sensitivities",
+            question,
+            lambda reply: replies.sensitivities_from_dict(reply, speed, ke_max),
         )
 
     def map(

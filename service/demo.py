@@ -26,7 +26,7 @@ from service.commands.outputs import progress_bar, terminal
 from service.commands.tables import ranking_table
 from service.screening.report_files import write_report
 from service.screening.screen import ScreeningReport, screen
-from training.answers import BoundaryAnswers, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, SensitivityAnswers
 
 READY_WITHIN_S = 60.0
 # A service that answers, but that it is not ready, rarely becomes so.
@@ -135,6 +135,18 @@ class TimedMaps:
     ) -> BoundaryAnswers:
         """As the inner one."""
         return self._inner.boundary(blade, contact, speed_hz, ke_max, policy, alpha)
+
+    def sensitivities(
+        self,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: np.ndarray,
+        ke_max: float,
+        policy: str = "auto",
+        alpha: float | None = None,
+    ) -> SensitivityAnswers:
+        """As the inner one."""
+        return self._inner.sensitivities(blade, contact, speed_hz, ke_max, policy, alpha)
 
     def map(
         self,

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdm_core.blade_sensitivity import Influence
+
 SURROGATE, EXACT = "surrogate", "exact"
 CONFIDENT, NEAR_BOUNDARY = "confident", "near_boundary"
 OUT_OF_DOMAIN, REQUESTED = "out_of_domain", "requested"
+UNSURE_SLOPE = "unsure_slope"  # of derivatives alone: the boundary itself is confident
 POLICIES = ("auto", "surrogate", "exact")
 
 
@@ -115,6 +118,60 @@ class BoundaryAnswers:
     def exact_share(self) -> float:
         """Share of the answers that come from the exact core."""
         return float(np.mean(self.source == EXACT))
+
+
+@dataclass(frozen=True)
+class SensitivityAnswers:
+    """Derivatives of the first crossing with respect to each of p parameters, at each of m speeds.
+
+    Attributes
+    ----------
+    critical_ke, chatter_hz, error_estimate
+        As in `BoundaryAnswers`, shape (m,); the error is that of `critical_ke`.
+    parameter, unit
+        In words, as in `sdm_core.blade_sensitivity.Influence`: p of each.
+    value
+        Of the parameters at each speed, shape (m, p).
+    derivative
+        dK_e/dp, N/m per unit, shape (m, p); NaN where there is no crossing, or it has no derivative.
+    relative
+        d ln K_e/d ln p, for the edge of an arc per revolution; shape (m, p), NaN likewise.
+    certificate
+        As in `BoundaryAnswers`: it is about the boundary, and says nothing of derivatives.
+    """
+
+    speed_hz: np.ndarray
+    ke_max: float
+    critical_ke: np.ndarray
+    chatter_hz: np.ndarray
+    error_estimate: np.ndarray
+    parameter: tuple[str, ...]
+    unit: tuple[str, ...]
+    value: np.ndarray
+    derivative: np.ndarray
+    relative: np.ndarray
+    source: np.ndarray
+    reason: np.ndarray
+    model: str | None
+    solver: str
+    certificate: CertificateUsed | None = None
+
+    @property
+    def exact_share(self) -> float:
+        """Share of the answers that come from the exact core."""
+        return float(np.mean(self.source == EXACT))
+
+    def influences(self, i: int) -> tuple[Influence, ...] | None:
+        """Parameter by parameter at one speed; None where there are no derivatives."""
+        if np.isnan(self.relative[i]).all():
+            return None
+        columns = (self.value[i], self.derivative[i], self.relative[i])
+        return tuple(
+            Influence(name, unit, float(value), float(derivative), float(relative))
+            for name, unit, value, derivative, relative in zip(
+                self.parameter, self.unit, *columns, strict=True
+            )
+        )
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class CaseBatch:
         """
         m, n = omega.shape
         damping = np.broadcast_to(damping_ratio, (m, n))
-        order = np.argsort(omega, axis=1, kind="stable")[:, :MODES]
+        order = order_of_modes(omega)
         omega_sorted = np.take_along_axis(omega, order, axis=1)
         damping_sorted = np.take_along_axis(damping, order, axis=1)
         shape = np.take_along_axis(contact_shape, order[:, None, :], axis=2)
@@ -162,6 +162,11 @@ class CaseBatch:
         keep = value > 1e-13 * max(value.max(), 1e-300)
         factor = vector[:, keep] * np.sqrt(value[keep])
         return ContactReceptance(self.omega[i, :n], self.damping_ratio[i, :n], factor)
+
+
+def order_of_modes(omega: np.ndarray) -> np.ndarray:
+    """Places of the modes a case has, the lowest frequency first; shape (m, n), at most five, from (m, n)."""
+    return np.argsort(omega, axis=1, kind="stable")[:, :MODES]
 
 
 def arcs_of(contact: ContactConfiguration) -> np.ndarray:

@@ -14,43 +14,46 @@ from typing import Any
 import numpy as np
 
 from sdm_core.blade import Blade
+from sdm_core.blade_sensitivity import check_differentiable
 from sdm_core.boundary import CHARACTERISTIC, CLOSED_FORM, boundary, verdicts
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import InvalidInput, TooMuchWork
+from sdm_core.errors import InvalidInput
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import stabilities
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from training.answers import (
     CONFIDENT,
     EXACT,
-    NEAR_BOUNDARY,
     OUT_OF_DOMAIN,
     POLICIES,
     REQUESTED,
     SURROGATE,
+    UNSURE_SLOPE,
     BoundaryAnswers,
     CertificateUsed,
     MapAnswers,
     PointAnswers,
+    SensitivityAnswers,
 )
 from training.cases import CaseBatch
 from training.certificate import Certificate
 from training.contact_class import contact_class, in_words
+from training.doubt import FirstCrossings, doubt_points, first_crossings
 from training.exact_answers import ExactAnswers
+from training.exact_budget import (
+    ARC_BOUNDARY_S,
+    ARC_VERDICT_S,
+    GRADIENT_S,
+    PERMANENT_S,
+    POINT_S,
+    check_budget,
+)
+from training.influence_table import InfluenceTable
 from training.registry import SHIPPED, Model, load_model
 from training.surrogate import PredictedBoundary
 from training.verification_band import VerificationBand
 
 logger = logging.getLogger("rubscreen.training")
-
-# A boundary is answered by the surrogate where its band is narrower than this in log10 K_e (5 %).
-_SURE_BOUNDARY = float(np.log10(1.05))
-# Seconds of exact work for up to five modes, from measured costs on one core of a small machine.
-_POINT_S, _ARC_VERDICT_S, _ARC_BOUNDARY_S, _PERMANENT_S = 0.02, 0.004, 0.5, 0.02
-# Measured from 5 to 40 modes: 0.025 s, 0.7 s, 5.9 s a point.
-_GROWTH_WITH_MODES = 2.6
-# Natural frequency over rotor speed up to which those costs hold; beyond it they grow in proportion.
-_VIBRATIONS = 200.0
 
 Observer = Callable[[ExactAnswers], None]
 
@@ -139,9 +142,9 @@ class Screener:
         else:
             probability = predicted.unstable_probability(stiffness)
             stable = (probability < 0.5).astype(float)
-            self._mark(reason, predicted, stiffness, band, policy)
+            doubt_points(predicted, stiffness, reason, band, policy)
         exact = self._exact_rows(reason, policy)
-        self._allow(exact.sum(), _POINT_S, blade, speed)
+        self._allow(exact.sum(), POINT_S, blade, speed)
         columns = np.full((6, len(speed)), np.nan)
         probability[exact], stable[exact] = np.nan, np.nan
         rows = np.flatnonzero(exact)
@@ -190,31 +193,13 @@ class Screener:
         """First crossing at each speed; raises as `points`."""
         speed = speeds("speed_hz", speed_hz)
         ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
-        band, certificate = self._band(contact, policy, alpha)
-        predicted, reason = self._predicted(blade, contact, speed, policy)
-        critical, chatter, error = (np.full(len(speed), np.nan) for _ in range(3))
-        if predicted is not None:
-            with np.errstate(over="ignore"):
-                critical = np.where(predicted.log_ke <= np.log10(ke_max), 10.0**predicted.log_ke, np.nan)
-            width = band.half_width(predicted)
-            error = 10.0 ** (band.spreads * predicted.spread) - 1
-            # Up to where crossings were looked for, it says there is none.
-            reach = np.broadcast_to(predicted.log_reach, len(speed))
-            top = np.minimum(np.log10(ke_max), reach)
-            beyond = (predicted.log_ke > top) & (reach < np.log10(ke_max))
-            if policy == "auto":
-                doubtful = width > _SURE_BOUNDARY
-                doubtful &= predicted.log_ke - width < top  # else none below, for sure
-                doubtful |= np.abs(predicted.log_ke - top) < width
-                reason[(reason == CONFIDENT) & doubtful] = NEAR_BOUNDARY
-                reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
-            elif beyond.any():
-                worst = int(np.argmax(beyond))
-                raise InvalidInput("ke_max", ke_max, _beyond(reach[worst], speed[worst]))
+        decided = self._first_crossings(blade, contact, speed, ke_max, policy, alpha)
+        critical, error, reason = decided.critical_ke, decided.error_estimate, decided.reason
+        chatter = np.full(len(speed), np.nan)
         exact = self._exact_rows(reason, policy)
         unstable: list[tuple[tuple[float, float], ...] | None] = [None] * len(speed)
         if exact.any():
-            unit = _PERMANENT_S if contact.permanent else _ARC_BOUNDARY_S
+            unit = PERMANENT_S if contact.permanent else ARC_BOUNDARY_S
             self._allow(exact.sum(), unit, blade, speed)
             found = boundary(blade, contact, speed[exact], ke_max, truncation=False)
             critical[exact], chatter[exact] = found.critical_ke, found.chatter_hz
@@ -233,8 +218,39 @@ class Screener:
             reason,
             self.model_id,
             _solver(contact),
-            certificate if predicted is not None else None,
+            decided.certificate,
         )
+
+    def sensitivities(
+        self,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed_hz: np.ndarray,
+        ke_max: float,
+        policy: str = "auto",
+        alpha: float | None = None,
+    ) -> SensitivityAnswers:
+        """What moves the first crossing at each speed, parameter by parameter; raises as `points`.
+
+        Under "auto" the surrogate answers, by automatic differentiation, where it would answer `boundary`,
+        unless it is not sure of its gradient (`training.influence_table`). Smooth engagement has no gradient.
+        """
+        speed = speeds("speed_hz", speed_hz)
+        ke_max = number("ke_max", ke_max, 0.0, KE_LIMIT, "N/m", open_low=True)
+        check_differentiable(contact)
+        decided = self._first_crossings(blade, contact, speed, ke_max, policy, alpha)
+        table = InfluenceTable(blade, contact, speed, decided)
+        if self.model is not None:
+            doubtful = table.predict(self.model.surrogate, ~self._exact_rows(decided.reason, policy))
+            if policy == "auto":
+                decided.reason[doubtful] = UNSURE_SLOPE
+        exact = self._exact_rows(decided.reason, policy)
+        if exact.any():
+            unit = PERMANENT_S if contact.permanent else ARC_BOUNDARY_S
+            self._allow(exact.sum(), unit + GRADIENT_S, blade, speed)
+            critical = table.solve(exact, ke_max)
+            self._tell(ExactAnswers.from_crossings, blade, contact, speed[exact], critical, ke_max)
+        return table.answers(ke_max, _source(exact), self.model_id, _solver(contact))
 
     def map(
         self,
@@ -257,12 +273,12 @@ class Screener:
             column = stiffness[:, None]
             probability = predicted.unstable_probability(column)
             stable = (probability < 0.5).astype(float)
-            self._mark(reason, predicted, column, band, policy)
+            doubt_points(predicted, column, reason, band, policy)
         exact = self._exact_rows(reason, policy)
         if contact.permanent:  # one solve decides a whole column
-            self._allow(exact.any(axis=0).sum(), _PERMANENT_S, blade, speed)
+            self._allow(exact.any(axis=0).sum(), PERMANENT_S, blade, speed)
         else:
-            self._allow(exact.sum(), _ARC_VERDICT_S, blade, speed)
+            self._allow(exact.sum(), ARC_VERDICT_S, blade, speed)
         if exact.any():
             row, col = np.nonzero(exact)
             stable[exact] = verdicts(blade, contact, speed[col], stiffness[row])
@@ -279,6 +295,22 @@ class Screener:
             _solver(contact),
             certificate if predicted is not None else None,
         )
+
+    def _first_crossings(
+        self,
+        blade: Blade,
+        contact: ContactConfiguration,
+        speed: np.ndarray,
+        ke_max: float,
+        policy: str,
+        alpha: float | None,
+    ) -> FirstCrossings:
+        """What the surrogate says of the boundary, and where it is not sure of it."""
+        band, certificate = self._band(contact, policy, alpha)
+        predicted, reason = self._predicted(blade, contact, speed, policy)
+        if predicted is None:
+            return FirstCrossings.none(reason)
+        return first_crossings(predicted, reason, band, certificate, speed, ke_max, policy)
 
     def _band(
         self, contact: ContactConfiguration, policy: str, alpha: float | None
@@ -340,26 +372,6 @@ class Screener:
         )
         return PredictedBoundary(*columns), reason
 
-    def _mark(
-        self,
-        reason: np.ndarray,
-        predicted: PredictedBoundary,
-        ke: np.ndarray,
-        band: VerificationBand,
-        policy: str,
-    ) -> None:
-        """Write into `reason` which points the surrogate is not sure of, or knows nothing of."""
-        with np.errstate(divide="ignore"):
-            beyond = np.log10(ke) > predicted.log_reach
-        if policy == "auto":
-            reason[(reason == CONFIDENT) & beyond] = OUT_OF_DOMAIN
-            reason[(reason == CONFIDENT) & band.verify(predicted, ke)] = NEAR_BOUNDARY
-        elif beyond.any():
-            at = tuple(np.argwhere(beyond)[0])
-            worst = float(np.broadcast_to(ke, beyond.shape)[at])
-            reach = float(np.broadcast_to(predicted.log_reach, beyond.shape)[at])
-            raise InvalidInput("ke", worst, _beyond(reach))
-
     def _exact_rows(self, reason: np.ndarray, policy: str) -> np.ndarray:
         if policy == "surrogate":
             return np.zeros(reason.shape, dtype=bool)
@@ -374,20 +386,7 @@ class Screener:
             logger.exception("exact answers could not be passed on")
 
     def _allow(self, count: int, unit_s: float, blade: Blade, speed: np.ndarray) -> None:
-        if not count:
-            return
-        fastest = max(float(state.frequency_hz.max()) for state in blade.states)
-        unit_s *= (max(blade.mode_count, 5) / 5) ** _GROWTH_WITH_MODES
-        unit_s *= max(1.0, fastest / float(speed.min()) / _VIBRATIONS)
-        most = int(self.exact_budget_s / unit_s)
-        if count > most:
-            many = f"ask for at most {most} of them in one call" if most else "leave out the highest modes"
-            raise TooMuchWork("speed_hz", f"{count} answers by the exact core", many)
-
-
-def _beyond(log_reach: float, speed_hz: float | None = None) -> str:
-    at = "" if speed_hz is None else f" at {speed_hz:g} Hz"
-    return f"the surrogate knows this blade up to {10.0**log_reach:.3g} N/m{at}; use policy auto or exact"
+        check_budget(self.exact_budget_s, count, unit_s, blade, speed)
 
 
 def _source(exact: np.ndarray) -> np.ndarray:

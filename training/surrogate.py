@@ -111,12 +111,13 @@ class Surrogate:
         with torch.inference_mode():
             for i in range(0, len(cases), _BATCH):
                 found = features(CaseTensors.of(cases[i : i + _BATCH]))
-                middle, log_spread = self._evaluate(found)
-                log_kappa.append(middle.numpy())
+                correction, log_spread = self.correction(found)
+                log_kappa.append((found.baseline + correction).numpy())
                 spread.append(torch.exp(log_spread).double().numpy())
         log_scale = np.log10(cases.stiffness_scale)
         return PredictedBoundary(np.concatenate(log_kappa) + log_scale, np.concatenate(spread))
 
-    def _evaluate(self, found: Features) -> tuple[Tensor, Tensor]:
+    def correction(self, found: Features) -> tuple[Tensor, Tensor]:
+        """What is added to the baseline of cases, and the log spread, by their features; shape (m,) each."""
         correction, log_spread = self.network(found.inputs)
-        return found.baseline + correction.double(), log_spread
+        return correction.double(), log_spread

@@ -103,6 +103,15 @@ def speeds_from(text: str | None, blade: Blade) -> tuple[float, float]:
     return operating_range(blade) if text is None else SpeedRange.parse(text, "--speed").for_blade(blade)
 
 
+def speeds_at(texts: Sequence[str], blade: Blade) -> list[float]:
+    """Rotor speeds in Hz, typed as ``16000rpm``; none is the blade's design speed."""
+    if texts:
+        return [Speed.parse(text, "--at").in_hz(blade.first_frequency_hz) for text in texts]
+    if blade.design_speed_hz is None:
+        raise InvalidInput("--at", "left out", "give a rotor speed: the blade file has no design speed")
+    return [blade.design_speed_hz]
+
+
 def operating_points(texts: Sequence[str], blade: Blade) -> list[OperatingPoint]:
     """Operating points typed as ``16000rpm=0.6``; without a share each counts once."""
     out = []
@@ -126,6 +135,7 @@ def check_work(
     *,
     here: bool,
     every_lobe: bool,
+    option: str = "--speed",
 ) -> None:
     """Refuse what the exact core would take hours for, as the service does.
 
@@ -135,6 +145,8 @@ def check_work(
         Whether it is answered in this process; a service has limits of its own.
     every_lobe
         Whether every lobe is to be followed.
+    option
+        Where the speeds were typed.
 
     Raises
     ------
@@ -154,7 +166,7 @@ def check_work(
         if not error.field.startswith("speed"):
             raise
         kind = OutOfSpeedRange if isinstance(error, OutOfSpeedRange) else InvalidInput
-        raise kind("--speed", error.value, error.remedy) from None
+        raise kind(option, error.value, error.remedy) from None
 
 
 def grid_from(text: str, field: str = "--grid") -> tuple[int, int]:

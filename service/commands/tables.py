@@ -11,6 +11,7 @@ from rich.table import Table
 from service.screening.screen import UNSTABLE
 
 if TYPE_CHECKING:
+    from sdm_core.blade_sensitivity import Influence
     from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
     from training.answers import CertificateUsed
@@ -29,6 +30,22 @@ def critical_speeds_table(title: str, tips: Sequence[CriticalSpeed]) -> Table:
             f"{tip.speed_ratio:.4f}",
             f"{tip.chatter_hz:.2f}",
             f"{tip.lobes_per_revolution:.2f}",
+        )
+    return table
+
+
+def influences_table(title: str, influences: Sequence[Influence], most: int = 10) -> Table:
+    """The parameters that move a critical K_e most, by what one per cent of each does."""
+    table = Table(title=title, title_justify="left", title_style="bold")
+    table.add_column("parameter")
+    for heading in ("value", "dK_e per unit [N/m]", "d ln K_e/d ln p"):
+        table.add_column(heading, justify="right")
+    for each in sorted(influences, key=lambda influence: -abs(influence.relative))[:most]:
+        table.add_row(
+            each.parameter,
+            f"{each.value:.6g} {each.unit}".strip(),
+            f"{each.derivative:+,.4g}",
+            f"{each.relative:+.4g}" + (" per revolution" if each.unit == "revolutions" else ""),
         )
     return table
 

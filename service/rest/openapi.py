@@ -14,7 +14,7 @@ from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
-from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
 from service.rest.schemas import ProblemDocument
 
 Json = dict[str, Any]
@@ -59,7 +59,14 @@ def install(app: FastAPI) -> None:
 
 
 def _components() -> Json:
-    described = (PointsQuestion, BoundaryQuestion, MapQuestion, BladeQuestion, ProblemDocument)
+    described = (
+        PointsQuestion,
+        BoundaryQuestion,
+        SensitivitiesQuestion,
+        MapQuestion,
+        BladeQuestion,
+        ProblemDocument,
+    )
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
     schemas = found["$defs"]
     parts = {"blade": "Blade", "contact": "Contact", "profile": "Profile"}

@@ -152,4 +152,5 @@ def _example(**question: Any) -> Json:
 
 POINTS_EXAMPLE: Json = _example(speed_hz=[180.0, 286.5], ke=[1000.0, 20000.0], policy="auto")
 BOUNDARY_EXAMPLE: Json = _example(speed_hz=[180.0, 240.0, 286.5], ke_max=100000.0, policy="auto")
+SENSITIVITIES_EXAMPLE: Json = _example(speed_hz=[180.0, 240.0], ke_max=100000.0, policy="auto")
 MAP_EXAMPLE: Json = _example(speed_hz=[180.0, 240.0, 286.5], ke=[1000.0, 20000.0], policy="auto")

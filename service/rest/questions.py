@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from sdm_core.blade import SCHEMA, Blade, blade_from_dict
+from sdm_core.blade_sensitivity import check_differentiable
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
@@ -153,6 +154,21 @@ class BoundaryQuestion(Question):
 
     def _largest_ke(self) -> tuple[str, float]:
         return "ke_max", self.ke_max
+
+
+class SensitivitiesQuestion(BoundaryQuestion):
+    """What moves the boundary at these speeds?"""
+
+    @model_validator(mode="after")
+    def _the_core_can_differentiate_it(self, info: ValidationInfo) -> Self:
+        check_differentiable(self.contact)
+        modes, nodes = self.blade.mode_count, len(self.blade.tip_nodes)
+        parameters = modes * (2 + nodes) + nodes + 2 + 2 * len(self.contact.arcs or ())
+        derivatives, most = len(self.speed_hz) * parameters, settings_of(info).max_points
+        if derivatives > most:
+            found = f"{len(self.speed_hz)} speeds x {parameters} parameters = {derivatives} derivatives"
+            raise TooLarge("speed_hz", found, f"give at most {most} derivatives: split the request by speed")
+        return self
 
 
 class MapQuestion(KeQuestion):

@@ -11,7 +11,13 @@ import numpy as np
 import orjson
 
 from sdm_core.errors import DamagedFile
-from training.answers import BoundaryAnswers, CertificateUsed, MapAnswers, PointAnswers
+from training.answers import (
+    BoundaryAnswers,
+    CertificateUsed,
+    MapAnswers,
+    PointAnswers,
+    SensitivityAnswers,
+)
 
 Json = dict[str, Any]
 
@@ -25,6 +31,7 @@ _POINT_FLOATS = (
     "wear_lobes",
 )
 _BOUNDARY_FLOATS = ("critical_ke", "chatter_hz", "error_estimate")
+_SENSITIVITY_FLOATS = (*_BOUNDARY_FLOATS, "value", "derivative", "relative")
 _LABELS = ("source", "reason")
 _MAP_ARRAYS = ("speed_hz", "ke", "stable", "unstable_probability", *_LABELS)
 
@@ -69,6 +76,28 @@ def boundary_from_dict(reply: Json, speed_hz: np.ndarray, ke_max: float) -> Boun
     )
     return BoundaryAnswers(
         speed_hz=speed_hz, ke_max=ke_max, unstable_ke=intervals, **floats, **_origin_from(reply)
+    )
+
+
+def sensitivities_to_dict(answers: SensitivityAnswers) -> Json:
+    """The reply of ``POST /v1/sensitivities``."""
+    return {
+        **_columns(answers, _SENSITIVITY_FLOATS),
+        "parameter": list(answers.parameter),
+        "unit": list(answers.unit),
+        **_origin(answers),
+    }
+
+
+def sensitivities_from_dict(reply: Json, speed_hz: np.ndarray, ke_max: float) -> SensitivityAnswers:
+    """The answers in a reply of ``POST /v1/sensitivities``."""
+    return SensitivityAnswers(
+        speed_hz=speed_hz,
+        ke_max=ke_max,
+        parameter=tuple(reply["parameter"]),
+        unit=tuple(reply["unit"]),
+        **_floats(reply, _SENSITIVITY_FLOATS),
+        **_origin_from(reply),
     )
 
 
@@ -129,7 +158,7 @@ def _columns(answers: Any, names: tuple[str, ...]) -> Json:
     return {name: np.ascontiguousarray(getattr(answers, name), dtype=float) for name in names}
 
 
-def _origin(answers: PointAnswers | BoundaryAnswers | MapAnswers) -> Json:
+def _origin(answers: PointAnswers | BoundaryAnswers | SensitivityAnswers | MapAnswers) -> Json:
     return {
         "source": answers.source.tolist(),
         "reason": answers.reason.tolist(),

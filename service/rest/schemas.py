@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Source = Literal["surrogate", "exact"]
 Reason = Literal["confident", "near_boundary", "out_of_domain", "requested"]
+SlopeReason = Literal["confident", "near_boundary", "unsure_slope", "out_of_domain", "requested"]
 
 _LOADING = "The model being loaded while the active one answers; null where there is none."
 _FAULT = "Why the model that the folder names does not answer; null where it does."
@@ -62,6 +63,29 @@ class BoundaryReply(Reply):
     )
     source: list[Source]
     reason: list[Reason]
+
+
+class SensitivitiesReply(Reply):
+    """What moves the first crossing: one row a speed, one column a parameter."""
+
+    critical_ke: list[float | None] = Field(description="N/m; null where there is none below ke_max.")
+    chatter_hz: list[float | None]
+    error_estimate: list[float | None] = Field(description="Of critical_ke, relative.")
+    parameter: list[str] = Field(
+        description="In words, e.g. `frequency of mode 1`. The rotor speed comes twice: with the modal data "
+        "moving as the blade's states say, and frozen."
+    )
+    unit: list[str]
+    value: list[list[float]] = Field(description="Of each parameter at each speed, in its unit.")
+    derivative: list[list[float | None]] = Field(
+        description="dK_e/dp, N/m per unit; null where there is no crossing, or it has no derivative."
+    )
+    relative: list[list[float | None]] = Field(
+        description="d ln K_e/d ln p: per cent of K_e by one per cent of it. For the edge of an arc "
+        "d ln K_e per revolution."
+    )
+    source: list[Source]
+    reason: list[SlopeReason]
 
 
 class MapReply(Reply):

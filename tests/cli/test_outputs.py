@@ -144,7 +144,7 @@ def test_version_and_help(rubscreen):
 
     assert rubscreen("--version").stdout.strip() == f"rubscreen {__version__}"
     shown = rubscreen("--help").stdout
-    for command in ("demo", "serve", "screen", "map", "boundary", "train", "models"):
+    for command in ("demo", "serve", "screen", "map", "boundary", "sensitivities", "train", "models"):
         assert command in shown
 
 

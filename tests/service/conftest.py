@@ -19,11 +19,21 @@ from fastapi import FastAPI
 
 from sdm_core.errors import InvalidInput
 from service.app import create_app
-from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
+from service.rest.question_schemas import (
+    BOUNDARY_EXAMPLE,
+    MAP_EXAMPLE,
+    POINTS_EXAMPLE,
+    SENSITIVITIES_EXAMPLE,
+)
 from service.settings import Settings
-from training.answers import BoundaryAnswers, CertificateUsed, MapAnswers, PointAnswers
+from training.answers import BoundaryAnswers, CertificateUsed, MapAnswers, PointAnswers, SensitivityAnswers
 
-EXAMPLES = {"/v1/stability": POINTS_EXAMPLE, "/v1/boundary": BOUNDARY_EXAMPLE, "/v1/map": MAP_EXAMPLE}
+EXAMPLES = {
+    "/v1/stability": POINTS_EXAMPLE,
+    "/v1/boundary": BOUNDARY_EXAMPLE,
+    "/v1/sensitivities": SENSITIVITIES_EXAMPLE,
+    "/v1/map": MAP_EXAMPLE,
+}
 CERTIFICATE = CertificateUsed(1e-3, 0.95, "rules/1", 12.0)
 
 
@@ -91,6 +101,28 @@ class RuleScreener:
             chatter_hz=np.full(speed_hz.shape, np.nan),
             error_estimate=np.full(speed_hz.shape, 1e-3),
             unstable_ke=(intervals,) * len(speed_hz),
+            **origin,
+        )
+
+    def sensitivities(
+        self, blade, contact, speed_hz, ke_max, policy="auto", alpha=None
+    ) -> SensitivityAnswers:
+        """The critical K_e goes with the square of the first frequency, and with nothing else."""
+        origin = self._origin(np.full(speed_hz.shape, ke_max), policy, alpha)
+        there = np.where(np.full(len(speed_hz), ke_max > self.critical), 1.0, np.nan)[:, None]
+        frequency = blade.at_speeds(speed_hz)[0][:, 0] / (2 * np.pi)
+        value = np.column_stack([frequency, np.full(len(speed_hz), blade.damping_ratio[0])])
+        return SensitivityAnswers(
+            speed_hz=speed_hz,
+            ke_max=ke_max,
+            critical_ke=self.critical * there[:, 0],
+            chatter_hz=np.full(speed_hz.shape, np.nan),
+            error_estimate=np.full(speed_hz.shape, 1e-3),
+            parameter=("frequency of mode 1", "damping of mode 1"),
+            unit=("Hz", ""),
+            value=value,
+            derivative=there * np.column_stack([2 * self.critical / frequency, 0.0 * frequency]),
+            relative=there * np.array([2.0, 0.0]),
             **origin,
         )
 

@@ -50,6 +50,7 @@ def test_the_client_answers_what_the_screener_answers(client, screener, policy):
     for ke_max in (1e3, 1e5):
         asked = (BLADE, CONTACT, SPEEDS, ke_max, policy)
         _same(far.boundary(*asked), near.boundary(*asked))
+        _same(far.sensitivities(*asked), near.sensitivities(*asked))
 
 
 def test_the_client_asks_for_a_rate_and_is_told_what_was_used(client, screener):
@@ -59,7 +60,8 @@ def test_the_client_asks_for_a_rate_and_is_told_what_was_used(client, screener):
         assert found.certificate.distribution == "rules/1"
         with pytest.raises(ServiceProblem, match="alpha"):
             far(BLADE, CONTACT, SPEEDS, KE, alpha=2e-3)
-    assert client.boundary(BLADE, CONTACT, SPEEDS, 1e5, alpha=1e-3).certificate.spreads == 12.0
+    for ask in (client.boundary, client.sensitivities):
+        assert ask(BLADE, CONTACT, SPEEDS, 1e5, alpha=1e-3).certificate.spreads == 12.0
 
 
 def test_a_map_of_a_service_that_knows_no_certificates_is_still_read(screener):

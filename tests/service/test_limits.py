@@ -52,6 +52,15 @@ def test_too_many_points_are_refused(small, question, problem):
     assert document["value"] == "101 entries" and "100" in document["remedy"]
 
 
+def test_too_many_derivatives_are_refused_with_their_number(small, question, problem):
+    # Three modes, three nodes: 3·(2 + 3) + 3 + 2 parameters.
+    body = question("/v1/sensitivities", speed_hz=[100.0] * 5)
+    assert small.post("/v1/sensitivities", json=body).status_code == 200
+    body = question("/v1/sensitivities", speed_hz=[100.0] * 6)
+    document = problem(small.post("/v1/sensitivities", json=body), 413, "speed_hz")
+    assert "120 derivatives" in document["value"] and "100" in document["remedy"]
+
+
 def test_too_many_points_of_a_map_are_refused(small, question, problem):
     body = question("/v1/map", speed_hz=[10.0] * 11, ke=[1.0] * 10)
     document = problem(small.post("/v1/map", json=body), 413, "speed_hz x ke")

@@ -39,6 +39,7 @@ def test_every_path_of_the_contract_is_there(document):
     assert paths == {
         "POST /v1/stability",
         "POST /v1/boundary",
+        "POST /v1/sensitivities",
         "POST /v1/map",
         "POST /v1/blades",
         "GET /v1/models",
@@ -48,7 +49,7 @@ def test_every_path_of_the_contract_is_there(document):
 
 
 def test_every_refusal_is_documented_as_a_problem(document):
-    for path in ("/v1/stability", "/v1/boundary", "/v1/map"):
+    for path in ("/v1/stability", "/v1/boundary", "/v1/sensitivities", "/v1/map"):
         responses = document["paths"][path]["post"]["responses"]
         for status in ("408", "413", "422", "500", "503"):
             assert list(responses[status]["content"]) == ["application/problem+json"]
@@ -57,7 +58,7 @@ def test_every_refusal_is_documented_as_a_problem(document):
 
 
 def test_the_examples_work_as_they_stand(document, http):
-    for path in ("/v1/stability", "/v1/boundary", "/v1/map"):
+    for path in ("/v1/stability", "/v1/boundary", "/v1/sensitivities", "/v1/map"):
         body = document["paths"][path]["post"]["requestBody"]["content"]["application/json"]
         assert http.post(path, json=body["example"]).status_code == 200
         required = document["components"]["schemas"][body["schema"]["$ref"].rpartition("/")[2]]["required"]

@@ -14,12 +14,13 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from sdm_core.blade import Blade, ModalState, example_blade
+from sdm_core.blade_sensitivity import critical_ke_sensitivities
 from sdm_core.boundary import boundary
 from sdm_core.contact import ContactConfiguration
 from sdm_core.fourier_engagement import FourierEngagement
 from service.app import create_app
 from service.client import Client
-from service.rest.question_schemas import POINTS_EXAMPLE
+from service.rest.question_schemas import POINTS_EXAMPLE, SENSITIVITIES_EXAMPLE
 from service.settings import Settings
 from training.certificate import Certificate, CertifiedBand
 from training.contact_class import PERMANENT
@@ -94,6 +95,29 @@ def test_points_map_and_boundary_over_http_agree_with_the_core(real, pattern):
         inside = [any(low < k < high for low, high in intervals) for k in ke]
         assert (grid.stable[:, i] == 0.0).tolist() == inside
         assert (points.stable[i] == 0.0) == inside[i]
+
+
+@pytest.mark.parametrize("arcs", [None, [(0.0, 0.25), (0.9, 0.95)]], ids=["permanent", "arcs"])
+def test_sensitivities_over_http_are_the_core_s(real, arcs):
+    blade, contact = example_blade("nasa_rotor_37"), ContactConfiguration.at("LE", "TE", arcs=arcs)
+    speeds = np.array([170.0, 220.0])
+    core = [critical_ke_sensitivities(blade, contact, speed, 1e5) for speed in speeds]
+    with Client(str(real.base_url)) as client:
+        here = client.sensitivities(blade, contact, speeds, 1e5)  # the untrained model verifies all
+        none = client.sensitivities(blade, contact, speeds, 1.0, "exact")
+    assert here.source.tolist() == ["exact", "exact"]
+    for i, exact in enumerate(core):
+        assert here.critical_ke[i] == pytest.approx(exact.value, rel=1e-9)
+        for ours, theirs in zip(here.influences(i), exact.influences, strict=True):
+            assert (ours.parameter, ours.unit) == (theirs.parameter, theirs.unit)
+            assert ours.relative == pytest.approx(theirs.relative, rel=1e-6, abs=1e-9)
+    assert none.influences(0) is None and np.isnan(none.critical_ke).all()
+
+
+def test_smooth_engagement_has_no_sensitivities(real, problem):
+    contact = {"weights": {"LE": 1.0}, "engagement": {"mean": 0.5, "cosine": [0.4]}}
+    body = SENSITIVITIES_EXAMPLE | {"contact": contact}
+    problem(real.post("/v1/sensitivities", json=body), 422, "contact.engagement")
 
 
 def test_auto_says_why_the_core_had_to_answer(real):

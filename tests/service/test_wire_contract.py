@@ -9,9 +9,14 @@ import time
 import numpy as np
 import pytest
 
-from service.rest.schemas import BoundaryReply, MapReply, PointsReply
+from service.rest.schemas import BoundaryReply, MapReply, PointsReply, SensitivitiesReply
 
-REPLIES = {"/v1/stability": PointsReply, "/v1/boundary": BoundaryReply, "/v1/map": MapReply}
+REPLIES = {
+    "/v1/stability": PointsReply,
+    "/v1/boundary": BoundaryReply,
+    "/v1/sensitivities": SensitivitiesReply,
+    "/v1/map": MapReply,
+}
 
 
 def _strict(text: str) -> dict:
@@ -62,6 +67,17 @@ def test_no_crossing_below_the_largest_stiffness_is_null(http, question):
     reply = http.post("/v1/boundary", json=question("/v1/boundary", ke_max=10.0, policy="exact")).json()
     assert reply["critical_ke"] == [None, None, None]
     assert reply["unstable_ke"] == [[], [], []]
+
+
+def test_sensitivities_have_a_row_for_each_speed_and_a_column_for_each_parameter(http, question):
+    reply = http.post("/v1/sensitivities", json=question("/v1/sensitivities")).json()
+    assert reply["parameter"] == ["frequency of mode 1", "damping of mode 1"]
+    assert reply["relative"] == [[2.0, 0.0]] * 2
+    assert [len(row) for row in reply["value"] + reply["derivative"]] == [2] * 4
+    low = http.post("/v1/sensitivities", json=question("/v1/sensitivities", ke_max=10.0)).json()
+    assert low["critical_ke"] == [None, None]
+    assert low["derivative"] == low["relative"] == [[None, None]] * 2
+    assert low["value"] == reply["value"]
 
 
 def test_a_map_has_a_row_for_each_stiffness_and_a_column_for_each_speed(http, question):

@@ -1,4 +1,4 @@
-"""``POST /v1/stability``, ``/v1/boundary``, ``/v1/map``."""
+"""``POST /v1/stability``, ``/v1/boundary``, ``/v1/sensitivities``, ``/v1/map``."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ from service.rest import replies
 from service.rest.body import parsed
 from service.rest.negotiation import best_form
 from service.rest.openapi import problems, request_body
-from service.rest.question_schemas import BOUNDARY_EXAMPLE, MAP_EXAMPLE, POINTS_EXAMPLE
-from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion
+from service.rest.question_schemas import (
+    BOUNDARY_EXAMPLE,
+    MAP_EXAMPLE,
+    POINTS_EXAMPLE,
+    SENSITIVITIES_EXAMPLE,
+)
+from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
 from service.rest.routes.request import TheBody, the_desk
-from service.rest.schemas import BoundaryReply, MapReply, PointsReply
+from service.rest.schemas import BoundaryReply, MapReply, PointsReply, SensitivitiesReply
 from training.answers import MapAnswers
 
 JSON, NPZ, BYTES, PNG = "application/json", "application/x-npz", "application/octet-stream", "image/png"
@@ -58,6 +63,27 @@ async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
         answerer = desk.answerer(ask.policy)
         found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy, ask.alpha)
         return replies.to_json(replies.boundary_to_dict(found))
+
+    return Response(await desk.work.run(answer, request), media_type=JSON)
+
+
+@router.post(
+    "/sensitivities",
+    response_model=SensitivitiesReply,
+    openapi_extra=request_body(SensitivitiesQuestion, SENSITIVITIES_EXAMPLE),
+    responses=problems(408, 413, 422, 500, 503),
+)
+async def what_moves_the_boundary(request: Request, body: TheBody) -> Response:
+    """By how much do frequencies, damping, amplitudes, weights, speed and arcs move the boundary?"""
+    desk = the_desk(request)
+
+    def answer() -> bytes:
+        ask = SensitivitiesQuestion.read(parsed(body), desk.settings)
+        answerer = desk.answerer(ask.policy)
+        found = answerer.sensitivities(
+            ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy, ask.alpha
+        )
+        return replies.to_json(replies.sensitivities_to_dict(found))
 
     return Response(await desk.work.run(answer, request), media_type=JSON)
 
