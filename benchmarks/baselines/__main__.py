@@ -15,8 +15,9 @@ parser.add_argument("--write", type=Path, help="document whose tables are to be 
 parser.add_argument(
     "--models", type=Path, default=SHIPPED, help="folder whose active model is the shipped one"
 )
-options = parser.parse_args()
-found = list(compared(options.models))
-Console(width=150).print(rendered(found))
-if options.write is not None:
-    write(found, options.write)
+if __name__ == "__main__":  # processes that are started read this file again
+    options = parser.parse_args()
+    found = compared(options.models)
+    Console(width=150).print(rendered(found))
+    if options.write is not None:
+        write(found, options.write)

@@ -19,21 +19,17 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.preprocessing import StandardScaler
 
-_SEED, _TREES, THREADS = 2013, 200, 2
+_SEED, _TREES = 2013, 100
 _AT_ONCE = 2_000
 _LIKELIHOOD_STEPS = 40
 
 
 def forest(rows: int) -> RandomForestRegressor:
-    return RandomForestRegressor(
-        _TREES, max_features=1 / 3, min_samples_leaf=2, n_jobs=THREADS, random_state=_SEED
-    )
+    return RandomForestRegressor(_TREES, max_features=1 / 3, min_samples_leaf=2, random_state=_SEED)
 
 
 def forest_classifier(rows: int) -> RandomForestClassifier:
-    return RandomForestClassifier(
-        _TREES, max_features=1 / 3, min_samples_leaf=2, n_jobs=THREADS, random_state=_SEED
-    )
+    return RandomForestClassifier(_TREES, max_features=1 / 3, min_samples_leaf=2, random_state=_SEED)
 
 
 def disagreement_of_trees(fitted: RandomForestRegressor, x: np.ndarray) -> np.ndarray:
@@ -89,10 +85,10 @@ class GaussianProcess:
     """Matérn 3/2 with a length for each input.
 
     The likelihood's gradient holds n²·f numbers, 8.6 GB for 6,000 labels and 30 inputs: lengths and noise are
-    learnt on the first 800 labels, and the process is then conditioned on all.
+    learnt on the first 500 labels, and the process is then conditioned on all.
     """
 
-    def __init__(self, learnt_on: int = 800) -> None:
+    def __init__(self, learnt_on: int = 500) -> None:
         self.learnt_on = learnt_on
 
     def fit(self, x: np.ndarray, y: np.ndarray) -> GaussianProcess:

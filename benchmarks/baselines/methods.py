@@ -17,7 +17,7 @@ from training.cases import CaseBatch
 
 _SEED = 2013
 # Verdicts a classifier is shown of each labelled case: anywhere a point may lie, and near the boundary.
-_ANYWHERE, _NEAR, _NEAR_WIDTH, _LOWEST = 3, 3, 0.1, -4.0
+_ANYWHERE, _NEAR, _NEAR_WIDTH, _LOWEST = 2, 2, 0.1, -4.0
 _BISECTIONS = 14
 
 
@@ -84,7 +84,7 @@ class FittedRegression:
 
 @dataclass(frozen=True)
 class Classification:
-    """The verdict from the inputs and log10 κ above their start; six verdicts a label, which cost nothing."""
+    """The verdict from the inputs and log10 κ above their start; four verdicts a label, all free."""
 
     name: str
     inputs: str

@@ -7,12 +7,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from training.active_learning import SPEEDS_EACH
-from training.calibration import truth
 from training.cases import CaseBatch
 from training.contact_class import ARCS, PERMANENT
 from training.design_space import DesignSpace
 from training.evaluation import HARD
-from training.labelling import critical_kappa
+from training.labelling import critical_kappa, truth
 from training.reference_space import reference_sample
 from training.seeds import seed_for
 from training.space_filling import space_filling
@@ -88,7 +87,7 @@ class Trial:
     def drawn(cls, contact: str, count: int, workers: int) -> Trial:
         """Points that no training, calibration or other figure has seen."""
         sample = reference_sample(count, seed_for(f"baselines, points, {contact}", _SEED), contact)
-        critical, unstable = truth(sample, workers)
+        critical, unstable = truth(sample.cases, sample.ke, workers=workers)
         held = (_fixed(a) for a in (sample.ke, critical, unstable))
         return cls(contact, read_only(sample.cases), *held, VERIFIED_SHARE[contact])
 
