@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -12,6 +13,7 @@ from benchmarks.baselines.inputs import Encoding, Inputs, lobes
 from benchmarks.baselines.samples import Labels
 from training.cases import CaseBatch
 from training.fit import FitSettings, Prepared, fit, train_network
+from training.registry import load_model
 from training.surrogate import BoundaryNetwork, Surrogate
 
 _SEED = 2013
@@ -38,15 +40,19 @@ class Ours:
 
 @dataclass(frozen=True)
 class Shipped:
-    """A trained model as it is served; it uses no label of the comparison, and has had `labels` before."""
+    """The active model of a folder as it is served; it uses no label of the comparison."""
 
-    surrogate: Surrogate
-    labels: int
+    models: Path
     name: str = "rubscreen, shipped"
     inputs: str = "lobes"
 
     def fit(self, labels: Labels) -> FittedSurrogate:
-        return FittedSurrogate(self.surrogate)
+        return FittedSurrogate(load_model(folder=self.models).surrogate)
+
+    @property
+    def labels(self) -> int:
+        """How many it was trained with, of both classes of contact."""
+        return int(load_model(folder=self.models).card["dataset"]["labels"])
 
 
 @dataclass(frozen=True)

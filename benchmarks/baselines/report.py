@@ -42,7 +42,7 @@ CAPTION = (
     "wrong: share of wrong verdicts, nothing verified; false stable, false unstable: how many once the least "
     "certain points are verified; near: those within 25 % of the boundary; to verify: least share that "
     "proves a false-stable rate below 1e-3 with 95 % confidence; boundary error: of the first crossing, "
-    "relative; MB: peak memory on top of data and libraries; one thread"
+    "relative; s: CPU seconds, one thread; MB: peak memory on top of data and libraries"
 )
 _BEGIN, _END = "<!-- measured -->", "<!-- end of what is measured -->"
 
@@ -147,7 +147,7 @@ def write(comparisons: list[Comparison], path: Path) -> None:
 
 def cells(line: Measured) -> tuple[str, ...]:
     """A line of the table."""
-    found, fitted = line.figures, line.fit_s > 1e-3  # what needs no fit takes microseconds
+    found, fitted = line.figures, line.labels > 0 and line.fit_s > 0.1
     return (
         line.method,
         line.inputs,
