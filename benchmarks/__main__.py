@@ -16,6 +16,7 @@ MEASUREMENTS = {
     "profiles": "benchmarks.profile_folder",
     "rotor37": "benchmarks.rotor_37_blade",
     "accuracy": "benchmarks.screening_accuracy",
+    "baselines": "benchmarks.baselines.report",
     "certificate": "benchmarks.certificate",
     "blades": "benchmarks.real_blades",
     "architectures": "benchmarks.architectures",
