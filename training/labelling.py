@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from sdm_core.errors import RubscreenError
 from sdm_core.floquet.arc_stability import batch_multipliers
+from sdm_core.parallel import shared
 from sdm_core.permanent_contact.permanent_boundary import permanent_crossings
 from training.arc_labels import crossings_by_verdicts
 from training.cases import CaseBatch
@@ -67,7 +66,7 @@ def critical_kappa(
     ]
     calls = [(label, (cases[rows], limit)) for label, rows, limit in jobs]
     done = 0
-    for i, labels in _solved(calls, workers):
+    for i, labels in shared(_run, calls, workers):
         out[jobs[i][1]] = labels
         done += len(labels)
         if progress is not None:
@@ -85,7 +84,7 @@ def point_verdicts(
     out = np.empty(len(cases))
     rows = [np.arange(i, min(i + _CHUNK, len(cases))) for i in range(0, len(cases), _CHUNK)]
     done = 0
-    for i, found in _solved([(_verdicts, (cases[r], ke[r])) for r in rows], workers):
+    for i, found in shared(_run, [(_verdicts, (cases[r], ke[r])) for r in rows], workers):
         out[rows[i]] = found
         done += len(found)
         if progress is not None:
@@ -108,20 +107,8 @@ def truth(
     return critical, unstable
 
 
-def _solved(calls: Sequence[_Call], workers: int) -> Iterator[tuple[int, np.ndarray]]:
-    """Results as they come, with the place of the call they are of."""
-    if workers <= 1:
-        for i, (solve, args) in enumerate(calls):
-            yield i, _one_thread(solve, *args)
-        return
-    context = multiprocessing.get_context("spawn")  # a forked torch or BLAS may hang
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        jobs = {pool.submit(_one_thread, solve, *args): i for i, (solve, args) in enumerate(calls)}
-        for job in as_completed(jobs):
-            yield jobs[job], job.result()
-
-
-def _one_thread(solve: Callable[..., np.ndarray], *args: object) -> np.ndarray:
+def _run(call: _Call) -> np.ndarray:
+    solve, args = call
     with threadpool_limits(1):
         return solve(*args)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -140,7 +140,7 @@ def train(
     if served_folder is not None:
         served = ServedAnswers.read(served_folder).for_training(s.design_space)
     with _torch_threads(1):
-        learner, rounds = _asked(s, served, data_folder, watch, progress)
+        learner, rounds = asked(s, served, data_folder, progress, watch.lap)
         cases, kappa = learner.labelled
         dataset = Dataset(cases, kappa, _provenance(s, learner.labels, rounds, served))
         dataset_path = dataset.write(data_folder)
@@ -167,10 +167,17 @@ def train(
     return TrainingResult(model, calibration.evaluations, dataset_path, tuple(rounds), watch.seconds, refused)
 
 
-def _asked(
-    s: TrainingSettings, served: TrainingCases | None, data_folder: Path, watch: _Watch, progress: Progress
+def asked(
+    s: TrainingSettings,
+    served: TrainingCases | None,
+    data_folder: Path,
+    progress: Progress = lambda stage, done, of, remark: None,
+    lap: Callable[[str], None] = lambda stage: None,
 ) -> tuple[ActiveLearner, list[Round]]:
-    """Label, fit and ask again, until the goal is certified on the monitoring sample or rounds are over."""
+    """Label, fit and ask again, until the goal is certified on the monitoring sample or rounds are over.
+
+    What was `served` is labelled with the first cases. `lap` is called after each stage with its name.
+    """
     learner, rounds = ActiveLearner(s.design_space, s.seed), []
     monitor = None
     for number in range(s.rounds + 1):
@@ -189,12 +196,12 @@ def _asked(
             partial(critical_kappa, cases, s.design_space, workers=s.threads, progress=labelled),
         )
         learner.tell(cases, kappa)
-        watch.lap("label")
+        lap("label")
         if number == s.rounds:
             break
         short = replace(s.fit, epochs=s.round_epochs)
         learner.learnt(_fitted(learner, s, short, progress, f"fit, round {number} of {s.rounds}"))
-        watch.lap("fit between rounds")
+        lap("fit between rounds")
         if s.goal is None:
             continue
         monitor = monitor or Monitor.drawn(CLASSES, s.monitor_points, s.seed, s.threads, progress)
@@ -202,7 +209,7 @@ def _asked(
         rounds.append(Round(learner.labels, shares))
         told = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in shares.items())
         progress("monitor", number + 1, s.rounds + 1, f"to verify for {s.goal.alpha:g}: {told}")
-        watch.lap("monitor")
+        lap("monitor")
         if s.goal.reached(shares):
             break
     return learner, rounds

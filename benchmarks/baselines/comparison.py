@@ -42,7 +42,7 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Measured:
-    """A method at a number of labels: figures, CPU seconds to fit and for 10,000 points, peak memory in bytes."""
+    """A method at a number of labels: figures, CPU s to fit and for 10,000 points, peak memory in bytes."""
 
     method: str
     inputs: str

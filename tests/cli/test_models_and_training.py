@@ -75,10 +75,14 @@ def test_maps_are_answered_at_the_rate_asked_for(rubscreen):
 def test_recalibrating_shows_every_rate_and_writes_another_model(rubscreen, own_models, monkeypatch):
     model = registry.load_model()
 
-    def as_it_says(cases, *, workers, progress=None):
-        return 10.0 ** model.surrogate.boundary(cases).log_ke / cases.stiffness_scale
+    def as_it_says(cases, ke, *, workers, progress=None):
+        critical = 10.0 ** model.surrogate.boundary(cases).log_ke
+        return critical, ke > critical
 
-    monkeypatch.setattr(calibration, "critical_kappa", as_it_says)
+    monkeypatch.setattr(calibration, "truth", as_it_says)
+    monkeypatch.setattr(
+        calibration, "point_verdicts", lambda *asked, **more: 1.0 - as_it_says(*asked, **more)[1]
+    )
     asked = ["models", "recalibrate", model.id, "--models", str(own_models), "--evaluation-points", "1000"]
     result = rubscreen(*asked, "--points", "20000", "--no-activate")
     assert result.exit_code == 0, result.output

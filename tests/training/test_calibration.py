@@ -41,8 +41,12 @@ def labels(monkeypatch):
         def verdicts(self, cases, ke, *, workers, progress=None):
             return (ke <= self.kappa(cases, workers=1) * cases.stiffness_scale).astype(float)
 
+        def truth(self, cases, ke, *, workers, progress=None):
+            critical = self.kappa(cases, workers=1) * cases.stiffness_scale
+            return critical, ke > critical
+
     labels = Labels()
-    monkeypatch.setattr(calibration, "critical_kappa", labels.kappa)
+    monkeypatch.setattr(calibration, "truth", labels.truth)
     monkeypatch.setattr(calibration, "point_verdicts", labels.verdicts)
     return labels
 

@@ -229,9 +229,9 @@ def test_training_on_wrong_labels_ends_without_a_promotion(tmp_path, monkeypatch
         4000, rounds=0, calibration_points=20_000, evaluation_points=2_000, seed=3, threads=1, fit=network
     )
     labels_times(1.0)
-    good = train(tmp_path / "models", settings)
+    good = train(tmp_path / "models", settings, data_folder=tmp_path / "good")
     labels_times(1.5)  # wrong in the training set, the calibration and the evaluation alike
-    wrong = train(tmp_path / "models", settings)
+    wrong = train(tmp_path / "models", settings, data_folder=tmp_path / "wrong")
     assert good.refused == () and active_id(tmp_path / "models") == good.model.id != wrong.model.id
     assert wrong.model.certificate(PERMANENT).alphas  # by its own card it is as good
     assert any("fresh points" in reason for reason in wrong.refused)

@@ -89,7 +89,7 @@ def test_the_shipped_model_needs_its_phase_features(screener, unseen, monkeypatc
     def shuffled(cases):
         found = features(cases)
         blind = [i for i, name in enumerate(MODE_FEATURES) if name in PHASE_FEATURES]
-        by_mode = found.inputs[:, : 5 * len(MODE_FEATURES)].view(len(cases), len(MODE_FEATURES), 5)
+        by_mode = found.inputs[:, : 5 * len(MODE_FEATURES)].view(len(found.inputs), len(MODE_FEATURES), 5)
         by_mode[:, blind] = by_mode.roll(1, dims=0)[:, blind]
         return found
 

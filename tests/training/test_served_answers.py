@@ -22,7 +22,7 @@ from training.answers import EXACT
 from training.design_space import DesignSpace
 from training.exact_answers import CROSSING, NO_CROSSING, STABLE, UNSTABLE, ExactAnswers
 from training.labelling import critical_kappa
-from training.pipeline import TrainingSettings, labelled_dataset
+from training.pipeline import TrainingSettings, asked
 from training.screening import Screener
 from training.served_answers import ServedAnswers
 from training.served_cases import ServedCases
@@ -76,8 +76,8 @@ def test_what_the_exact_core_answers_is_kept_and_what_the_surrogate_answers_is_n
 def test_every_way_of_asking_bounds_the_first_crossing(model, kept, folder):
     screener = Screener(model, on_exact=kept.keep)
     screener.map(ROTOR, LE, SPEEDS, np.linspace(0.0, 2.5e4, 30), "exact")
-    screener.points(ROTOR, TWO_ARCS, SPEEDS[::8], np.full(4, 2e3))  # out of the model's domain
-    screener.points(ROTOR, TWO_ARCS, SPEEDS[::8], np.full(4, 6e4))
+    screener.points(ROTOR, TWO_ARCS, SPEEDS[::8], np.full(4, 2e3), "exact")
+    screener.points(ROTOR, TWO_ARCS, SPEEDS[::8], np.full(4, 6e4), "exact")
     screener.boundary(ROTOR, ContactConfiguration.at("TE"), SPEEDS[::6], 2e4, "exact")
     kept.flush()
     cases, low, high = ServedAnswers.read(folder).bounds()
@@ -341,20 +341,22 @@ def test_served_cases_join_the_training_set_with_labels_of_their_own_and_are_on_
     kept.keep(crossings([20.0, 250.0], contact=TWO_ARCS))
     kept.keep(crossings([20.0]))  # below the design space
     kept.flush()
-    served = ServedAnswers.read(folder)
-    settings = TrainingSettings(designs=8, speeds_each=2, threads=1)
-    dataset = labelled_dataset(settings, lambda *said: None, served)
-    plain = labelled_dataset(settings, lambda *said: None)
-    assert len(dataset.cases) == len(plain.cases) + len(SPEEDS)
-    joined = dataset.cases[len(plain.cases) :]
+    read = ServedAnswers.read(folder)
+    served = read.for_training(DesignSpace())
+    settings = TrainingSettings(first_cases=16, rounds=0, threads=1)
+    (with_them, _), (without, _) = (asked(settings, s, folder / "labels") for s in (served, None))
+    cases, kappa = with_them.labelled
+    joined, found = cases[without.labels :], kappa[without.labels :]
+    assert len(joined) == len(SPEEDS) + 1 and without.labels == 14
     exact = boundary(ROTOR, LE, SPEEDS, 1e6).critical_ke
-    found = dataset.kappa[len(plain.cases) :] * joined.stiffness_scale
-    np.testing.assert_allclose(found[np.argsort(joined.speed_hz)], exact, rtol=1e-6)
-    assert dataset.provenance["served"]["cases"] == len(SPEEDS)
-    assert dataset.provenance["served"]["left_out"] == 3
-    other = replace(served, speed_hz=served.speed_hz * 1.01).for_training(DesignSpace()).provenance
-    assert other["sha256"] != dataset.provenance["served"]["sha256"]
-    assert "served" not in plain.provenance
+    permanent = joined.permanent
+    critical = (found * joined.stiffness_scale)[permanent]
+    np.testing.assert_allclose(critical[np.argsort(joined.speed_hz[permanent])], exact, rtol=1e-6)
+    with_arcs = boundary(ROTOR, TWO_ARCS, np.array([250.0]), 1e6).critical_ke
+    np.testing.assert_allclose((found * joined.stiffness_scale)[~permanent], with_arcs, rtol=3e-4)
+    assert (served.provenance["cases"], served.provenance["left_out"]) == (len(SPEEDS) + 1, 2)
+    other = replace(read, speed_hz=read.speed_hz * 1.01).for_training(DesignSpace()).provenance
+    assert other["sha256"] != served.provenance["sha256"]
 
 
 def test_a_folder_that_is_not_there_or_cannot_be_made_is_named(tmp_path):
