@@ -207,12 +207,17 @@ def asked(
         monitor = monitor or Monitor.drawn(CLASSES, s.monitor_points, s.seed, s.threads, progress)
         shares = monitor.verified_shares(learner.surrogate, s.design_space, s.goal)
         rounds.append(Round(learner.labels, shares))
-        told = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in shares.items())
+        told = ", ".join(f"{in_words(c)} {share_in_words(share)}" for c, share in shares.items())
         progress("monitor", number + 1, s.rounds + 1, f"to verify for {s.goal.alpha:g}: {told}")
         lap("monitor")
         if s.goal.reached(shares):
             break
     return learner, rounds
+
+
+def share_in_words(share: float) -> str:
+    """A share to verify, or that no band proves the rate."""
+    return f"{share:.1%}" if share <= 1.0 else "no band proves it"
 
 
 def _fitted(

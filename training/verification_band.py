@@ -8,9 +8,7 @@ import numpy as np
 
 from training.surrogate import PredictedBoundary
 
-ONE_PERCENT, TWO_PERCENT, FIVE_PERCENT, TEN_PERCENT = (
-    float(np.log10(1 + p)) for p in (0.01, 0.02, 0.05, 0.1)
-)
+ONE_PERCENT, FIVE_PERCENT, TEN_PERCENT = (float(np.log10(1 + p)) for p in (0.01, 0.05, 0.1))
 
 
 @dataclass(frozen=True)

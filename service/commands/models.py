@@ -52,6 +52,9 @@ def run(
     for entry in entries:
         table.add_row("active" if entry["active"] else "", entry["id"], *_figures(entry["card"]))
     console.print(table if entries else "no models: train one with `rubscreen train`")
+    for entry in entries:
+        if entry.get("damage"):
+            console.print(f"{entry['id']} is damaged: {entry['damage']}", markup=False)
     changes = history_of(_folder(models)) if history else ()
     if history:
         console.print(_history_table(changes))
@@ -214,7 +217,10 @@ def _of_folder(models: str | None) -> list[dict[str, Any]]:
     from training.registry import list_models
 
     found = list_models(_folder(models))
-    return [{"id": entry.id, "active": entry.active, "card": entry.card} for entry in found]
+    return [
+        {"id": entry.id, "active": entry.active, "card": entry.card, "damage": entry.damage}
+        for entry in found
+    ]
 
 
 def _history_table(changes: tuple[Activation, ...]) -> Table:

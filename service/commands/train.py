@@ -75,6 +75,8 @@ def run(
 ) -> None:
     """Label cases with the exact core, fit, ask where it is unsure, calibrate and evaluate a surrogate.
 
+    Labels are kept in a folder `datasets` beside FOLDER: a training that was killed goes on from them.
+
     Example: rubscreen train out/models --seed 1, then rubscreen map nasa_rotor_37 --models out/models
     """
     from service.commands.models import certificate_table, say_written
@@ -82,13 +84,14 @@ def run(
     from training.certificate import CalibrationFailed
     from training.contact_class import in_words
     from training.fit import FitSettings
-    from training.pipeline import TrainingSettings, train
+    from training.pipeline import TrainingSettings, share_in_words, train
 
     check_writable(json=json, folder=f"{folder}/active")
     settings = TrainingSettings(
         first_cases=cases,
         cases_each=cases_each,
         rounds=rounds,
+        monitor_points=min(points, TrainingSettings.monitor_points),
         calibration_points=points,
         evaluation_points=evaluation_points,
         seed=seed,
@@ -120,7 +123,9 @@ def run(
             f"99 of 100 below {evaluation.p99_boundary_error:.2%}"
         )
     for one in made.rounds:
-        shares = ", ".join(f"{in_words(c)} {share:.1%}" for c, share in one.verified_share.items())
+        shares = ", ".join(
+            f"{in_words(c)} {share_in_words(share)}" for c, share in one.verified_share.items()
+        )
         console.print(f"[dim]{one.labels:,} labels: to verify for the goal {shares}[/dim]")
     console.print(f"[dim]seconds: {', '.join(f'{k} {v:g}' for k, v in made.seconds.items())}[/dim]")
     if json:
@@ -132,6 +137,7 @@ def run(
             "refused": list(made.refused),
         }
         write_json(json, report, indent=True)
+    console.print(f"[dim]labelled cases: {made.dataset_path}[/dim]")
     say_written(console, made.model.id, folder, activate, made.refused)
 
 
