@@ -42,7 +42,15 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Measured:
-    """A method at a number of labels: figures, CPU s to fit and for 10,000 points, peak memory in bytes."""
+    """A method at a number of labels.
+
+    Attributes
+    ----------
+    fit_s, ten_thousand_s
+        CPU seconds to fit, and to answer 10,000 points.
+    memory
+        Bytes on top of data and libraries at the peak; with `fit_s` NaN where nothing was fitted.
+    """
 
     method: str
     inputs: str
@@ -66,9 +74,10 @@ def measured(method: Method, labels: Labels, trial: Trial) -> Measured:
         score = fitted.score(trial.cases, trial.log_kappa)
         took = time.process_time() - start
     figures = judged(score, fitted.boundary(trial.cases), trial)
-    return Measured(
-        method.name, method.inputs, len(labels), figures, fit_s, took * 1e4 / len(trial), memory[0]
-    )
+    cost = (fit_s, took * 1e4 / len(trial), memory[0])
+    if len(labels) == 0:
+        cost = (np.nan, cost[1], np.nan)
+    return Measured(method.name, method.inputs, len(labels), figures, *cost)
 
 
 @contextmanager

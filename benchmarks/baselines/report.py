@@ -147,7 +147,7 @@ def write(comparisons: list[Comparison], path: Path) -> None:
 
 def cells(line: Measured) -> tuple[str, ...]:
     """A line of the table."""
-    found, fitted = line.figures, line.labels > 0 and line.fit_s > 0.1
+    found = line.figures
     return (
         line.method,
         line.inputs,
@@ -157,8 +157,8 @@ def cells(line: Measured) -> tuple[str, ...]:
         f"{found.helped.false_unstable:,} / {found.helped_near.false_unstable:,}",
         f"{found.to_verify:.2%}" if found.to_verify <= 1 else f"> {SHARES[0]:.0%}",
         f"{_error(found.median_boundary_error)} / {_error(found.p99_boundary_error)}",
-        f"{line.fit_s:.1f}" if fitted else "-",
-        f"{line.memory / 2**20:,.0f}" if fitted else "-",
+        f"{line.fit_s:.1f}".replace("nan", "-"),
+        f"{line.memory / 2**20:,.0f}".replace("nan", "-"),
         f"{line.ten_thousand_s:.2f}",
     )
 
