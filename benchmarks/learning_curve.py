@@ -19,7 +19,7 @@ from training.reference_space import ReferenceSample, reference_sample
 from training.seeds import seed_for
 from training.surrogate import Surrogate
 
-SIZES = (8_192, 16_384, 32_768, 65_536)
+SIZES = (8_192, 16_384, 32_768)
 RATES = (1e-3, 1e-4)
 SETTINGS = replace(FitSettings(), epochs=15)
 PICTURE = Path("docs/images/learning_curve.png")
@@ -44,7 +44,7 @@ class Point:
     verified: tuple[float, ...]
 
 
-def table(points: int = 60_000, workers: int = 2, picture: Path | None = PICTURE) -> Table:
+def table(points: int = 40_000, workers: int = 2, picture: Path | None = PICTURE) -> Table:
     """Both curves, as a table and a picture."""
     unseen = {c: _unseen(c, points, workers) for c in (PERMANENT, ARCS)}
     curve = []
