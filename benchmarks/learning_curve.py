@@ -20,7 +20,7 @@ from training.seeds import seed_for
 from training.surrogate import Surrogate
 
 SIZES = (8_192, 16_384, 32_768)
-RATES = (1e-3, 1e-4)
+RATES = (1e-3, 5e-4)
 SETTINGS = replace(FitSettings(), epochs=15)
 PICTURE = Path("docs/images/learning_curve.png")
 
@@ -115,10 +115,12 @@ def draw(curve: list[Point], path: Path) -> None:
             labels = [p.labels for p in some]
             name = f"{in_words(contact)}, {how}"
             axes[0].plot(labels, [100 * p.wrong for p in some], style, color=colour[contact], label=name)
-            axes[1].plot(labels, [100 * p.verified[-1] for p in some], style, color=colour[contact])
+            axes[1].plot(labels, [100 * p.verified[0] for p in some], style, color=colour[contact])
     axes[0].set_ylabel("wrong verdicts of the surrogate alone, %")
-    axes[1].set_ylabel(f"to verify for a proven false-stable rate of {RATES[-1]:g}, %")
+    axes[1].set_ylabel(f"to verify for a proven false-stable rate of {RATES[0]:g}, %")
     axes[0].set_yscale("log")
+    axes[0].yaxis.set_major_formatter("{x:g}")
+    axes[0].yaxis.set_minor_formatter("{x:.1g}")
     axes[0].legend(frameon=False)
     for a in axes:
         a.set_xscale("log", base=2)
