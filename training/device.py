@@ -28,8 +28,7 @@ def chosen_device(name: str = "auto") -> torch.device:
         device = torch.device(name)
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
-        told = str(error).splitlines()[0]
-        raise InvalidInput("device", name, f"use auto, cpu or cuda: {told}") from None
+        raise InvalidInput("device", name, "use auto, cpu, or cuda where there is one") from error
     if device.type == "cuda":  # what cuBLAS needs to give the same figures twice
         os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     return device

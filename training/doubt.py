@@ -48,7 +48,9 @@ def first_crossings(
     ke_max: float,
     policy: str,
 ) -> FirstCrossings:
-    """First crossings up to `ke_max`; under "auto" the surrogate is sure where its band is narrower than 5 %.
+    """First crossings up to `ke_max`; under "auto" the surrogate is sure where its band is at most 5 % wide.
+
+    A band that is wider everywhere, as the shipped one with arcs, leaves it only to say that there is none.
 
     Parameters
     ----------

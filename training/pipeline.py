@@ -19,6 +19,7 @@ from training.cases import CaseBatch
 from training.contact_class import in_words
 from training.dataset import Dataset, kept_labels
 from training.design_space import DesignSpace
+from training.device import chosen_device
 from training.evaluation import Evaluation
 from training.fit import FitSettings, fit
 from training.labelling import critical_kappa
@@ -130,10 +131,13 @@ def train(
     ------
     InvalidInput
         When there is no such `served_folder`.
+    InvalidInput
+        For a device that is not there, before anything is done.
     CalibrationFailed
         When no verification band keeps the false-stable bound; nothing is written then.
     """
     s = settings or TrainingSettings()
+    chosen_device(s.fit.device)  # before minutes of labelling, not after
     watch = _Watch()
     data_folder = data_folder or models_folder.parent / "datasets"
     served = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdm_core.errors import DamagedFile
+from sdm_core.errors import DamagedFile, InvalidInput
 from training import calibration, pipeline, registry
 from training.calibration import CalibrationSettings, recalibrate
 from training.certificate import CalibrationFailed
@@ -111,6 +111,14 @@ def test_a_card_of_the_age_before_certificates_is_refused_until_it_is_recalibrat
     cases = calibration.reference_sample(50, 1).cases
     same = load_model(made.id, models).surrogate.boundary(cases)
     np.testing.assert_array_equal(same.log_ke, new.surrogate.boundary(cases).log_ke)
+
+
+def test_a_device_that_is_not_there_is_refused_before_anything_is_labelled(tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "asked", None)
+    settings = TrainingSettings(fit=FitSettings(device="bananas"))
+    with pytest.raises(InvalidInput, match="device = bananas: use auto, cpu"):
+        train(tmp_path / "models", settings)
+    assert not list(tmp_path.iterdir())
 
 
 def test_training_writes_the_card_that_recalibrating_does(tmp_path, labels, monkeypatch):
