@@ -25,6 +25,11 @@ class Settings(BaseSettings):
         How often the service looks whether another model has become active, s; 0 is never.
     served_answers_folder
         Where exact answers are kept for retraining; None keeps none.
+    data_folder
+        Where jobs, uploads and the database are; None runs no jobs and keeps no keys.
+    database_url
+        ``postgresql://USER:PASSWORD@HOST/DATABASE``, which several replicas may share; None is SQLite in the
+        data folder.
     max_body_bytes
         Largest request body; longer ones are refused while they arrive.
     body_timeout_s
@@ -69,6 +74,8 @@ class Settings(BaseSettings):
     models_folder: Path | None = None
     models_poll_s: Annotated[float, Ge(0)] = 1.0
     served_answers_folder: Path | None = None
+    data_folder: Path | None = None
+    database_url: str | None = None
     max_body_bytes: Count = 16 * 2**20
     body_timeout_s: Seconds = 60.0
     max_points: Count = 250_000

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from anyio import CapacityLimiter, to_thread
 
+from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
+from service.records.database import Database, database_url
 from service.rest.active_model import ActiveModel, Answering, WatchedModel
 from service.rest.errors import NotReady
 from service.rest.limits import WorkQueue
@@ -30,12 +32,15 @@ class Desk:
         Where answers are computed.
     kept
         Where exact answers go for retraining; None where they are not kept.
+    database
+        Keys, jobs and audits; None without a data folder.
     """
 
     settings: Settings
     model: ActiveModel
     work: WorkQueue
     kept: ServedAnswers | None
+    database: Database | None
     _checking: CapacityLimiter
 
     @classmethod
@@ -45,8 +50,9 @@ class Desk:
         Raises
         ------
         InvalidInput
-            When the folder for exact answers cannot be made.
+            When the folder for exact answers or for data cannot be made, or the database cannot be used.
         """
+        database = _database(settings)
         kept, model = None, ActiveModel(Answering(screener)) if screener is not None else None
         if model is None:
             if settings.served_answers_folder is not None:
@@ -54,7 +60,7 @@ class Desk:
             observer = None if kept is None else kept.keep
             model = WatchedModel(_folder(settings), settings.models_poll_s, observer)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
-        return cls(settings, model, work, kept, CapacityLimiter(1))
+        return cls(settings, model, work, kept, database, CapacityLimiter(1))
 
     def close(self) -> None:
         """Stop what still runs, and write what is to be kept."""
@@ -62,6 +68,8 @@ class Desk:
         self.model.close()
         if self.kept is not None:
             self.kept.close()
+        if self.database is not None:
+            self.database.close()
 
     def models(self) -> list[ModelEntry]:
         """The models of the registry, the one that answers marked and first."""
@@ -116,3 +124,15 @@ class Desk:
 
 def _folder(settings: Settings) -> Path:
     return settings.models_folder or SHIPPED
+
+
+def _database(settings: Settings) -> Database | None:
+    folder = settings.data_folder
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        remedy = f"it cannot be made ({error.strerror}): give another folder"
+        raise InvalidInput("data_folder", str(folder), remedy) from None
+    return Database(database_url(settings.database_url, folder))

@@ -1,0 +1,1 @@
+"""What the service remembers: rows in SQLite or PostgreSQL, one file a subject."""
