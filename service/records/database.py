@@ -125,7 +125,7 @@ def _engine(url: URL) -> Engine:
 
     @event.listens_for(engine, "connect")
     def configure(connection, record) -> None:
-        # With a write-ahead log readers go on while a job writes; FULL keeps what was accepted over a power cut.
+        # With a write-ahead log readers go on while a job writes; FULL survives a power cut.
         connection.isolation_level = "IMMEDIATE"
         for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
             connection.execute(f"PRAGMA {pragma}")
