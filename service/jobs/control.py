@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from pathlib import Path
 from threading import Event
 from typing import Any
 
@@ -27,12 +28,14 @@ class Control:
     ----------
     job
         As it was when this run began.
+    folder
+        Where its files are.
     waiting_for
         What it waits for now; kept here too, since a full disk may keep it from the database.
     """
 
-    def __init__(self, job: Job, records: JobRecords, closing: Event) -> None:
-        self.job, self._records, self._closing = job, records, closing
+    def __init__(self, job: Job, folder: Path, records: JobRecords, closing: Event) -> None:
+        self.job, self.folder, self._records, self._closing = job, folder, records, closing
         self.waiting_for: str | None = None
         self._looked = self._said = 0.0
         self._unsaid: dict[str, Any] = {}

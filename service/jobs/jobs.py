@@ -155,11 +155,11 @@ class Jobs:
         return self.get(job_id, kind)
 
     def retry(self, job_id: str, kind: str) -> Job:
-        """Queue a failed or cancelled job again; what it had stored stays.
+        """Queue a job that is over again; what it had stored stays.
 
         Raises
         ------
-        NoSuchJob, Finished
+        NoSuchJob, UnderWay
         """
         self.records.get(job_id, kind)
         job = self.records.start_again(job_id)
@@ -200,12 +200,12 @@ class Jobs:
         job = self.records.get(job_id)
         if job.state.finished:
             return
-        control = Control(job, self.records, self._closing)
+        folder = self.folders.of(job_id)
+        control = Control(job, folder.path, self.records, self._closing)
         with self._running:
             if job_id in self._controls:
                 return
             self._controls[job_id] = control
-        folder = self.folders.of(job_id)
         try:
             self._end(job, folder, self._outcome(job, folder, control))
         finally:

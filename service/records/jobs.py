@@ -66,8 +66,8 @@ class OtherRequest(InvalidInput):
     """The idempotency key was used with another request."""
 
 
-class Finished(InvalidInput):
-    """The job is over; or it is not, where it should be."""
+class UnderWay(InvalidInput):
+    """The job is not over."""
 
 
 class JobRecords:
@@ -163,16 +163,16 @@ class JobRecords:
             return connection.execute(change.values(**values)).rowcount == 1
 
     def start_again(self, job_id: str) -> Job:
-        """Queue a failed or cancelled job once more.
+        """Queue a job that is over once more: what it had stored and is whole stays.
 
         Raises
         ------
-        Finished
-            When it is under way, or done.
+        UnderWay
+            When it is not over.
         """
         changed = self.update(
             job_id,
-            only=(State.FAILED, State.CANCELLED),
+            only=FINISHED,
             state=State.QUEUED,
             attempt=JOBS.c.attempt + 1,
             started_at=None,
@@ -183,7 +183,7 @@ class JobRecords:
         )
         job = self.get(job_id)
         if not changed:
-            raise Finished("id", f"{job_id}, {job.state.value}", "retry a failed or cancelled job only")
+            raise UnderWay("id", f"{job_id}, {job.state.value}", "cancel it first, or wait until it is over")
         return job
 
     def unfinished(self) -> list[Job]:

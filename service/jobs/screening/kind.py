@@ -1,0 +1,199 @@
+"""The run of a screening: chunks that are not stored yet are computed, a few at a time, and stored."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from sdm_core.errors import RubscreenError
+from service.jobs.control import Control
+from service.jobs.durable_files import NoRoom, check_room, is_full
+from service.jobs.engine import Engine, EngineGone, WorkerKilled
+from service.jobs.job_folder import JobFolder
+from service.jobs.screening.blade_lines import BladeLine, read_chunks
+from service.jobs.screening.chunk import chunk_payload, compute_chunk
+from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade, rows_of
+from service.jobs.screening.chunk_store import ChunkStore
+from service.jobs.screening.request import ScreeningRequest
+from service.jobs.screening.results import write_results
+
+# Chunks in the engine for each of its workers: enough that none waits, few enough that another job gets in.
+_AHEAD = 2
+_LOOK_EVERY_S = 0.2
+_ALONE_KILLS = "its computation ended the worker, in each of several tries: too large, or a fault of ours"
+logger = logging.getLogger("rubscreen.jobs")
+
+
+@dataclass
+class _Tally:
+    """Blades of the job, those stored, and those of them not screened."""
+
+    total: int
+    done: int = 0
+    not_screened: int = 0
+
+
+class ScreeningKind:
+    """Runs screening jobs.
+
+    Parameters
+    ----------
+    engine
+        Where chunks are computed.
+    limits
+        Settings that bound what the exact core is asked (`service.rest.limits.check_reach`).
+    reserve_bytes
+        Room to leave on the disk.
+    """
+
+    def __init__(self, engine: Engine, limits: Mapping[str, Any], reserve_bytes: int) -> None:
+        self._engine, self._limits, self._reserve = engine, dict(limits), reserve_bytes
+
+    def run(self, folder: JobFolder, control: Control) -> None:
+        """Compute what is not stored, then write the ranking.
+
+        Raises
+        ------
+        DamagedFile
+            When the job's own files are not what was written.
+        InvalidInput
+            When the model cannot be loaded.
+        Cancelled, HandedBack
+            As `Control.check`.
+        """
+        asked = folder.request()
+        request = ScreeningRequest.from_dict(asked)
+        store = ChunkStore(folder.chunks)
+        control.report(stage="looking at what is stored", now=True)
+        stored = store.verified()
+        tally = _Tally(sum(1 for _ in read_chunks(folder.path, 1)))
+        left = []
+        for number, blades in read_chunks(folder.path, request.blades_per_chunk):
+            if number in stored:
+                tally.done += len(blades)
+                tally.not_screened += len(rows_of(store.read(number))[1])
+            else:
+                left.append(number)
+            control.check()
+        self._tell(control, tally, "screening")
+        self._compute(folder, asked, request, left, store, control, tally)
+        control.report(stage="ranking", now=True)
+        self._keep(control, partial(write_results, folder, request))
+        control.report(stage="", done=tally.done, now=True)
+
+    def _compute(
+        self,
+        folder: JobFolder,
+        asked: dict[str, Any],
+        request: ScreeningRequest,
+        left: list[int],
+        store: ChunkStore,
+        control: Control,
+        tally: _Tally,
+    ) -> None:
+        wanted = set(left)
+        chunks = (c for c in read_chunks(folder.path, request.blades_per_chunk) if c[0] in wanted)
+        again: deque[tuple[int, list[BladeLine]]] = deque()
+        pending: dict[Future[bytes], tuple[int, list[BladeLine]]] = {}
+        try:
+            while True:
+                most = max(1, _AHEAD * self._slots(control))
+                while len(pending) < most and (chunk := again.popleft() if again else next(chunks, None)):
+                    folder.note(event="submitted", chunk=chunk[0])
+                    try:
+                        pending[self._submit(asked, chunk[1], control)] = chunk
+                    except EngineGone as gone:
+                        again.append(chunk)
+                        self._lost(gone, control)
+                if not pending:
+                    return
+                done, _ = wait(pending, _LOOK_EVERY_S, FIRST_COMPLETED)
+                control.check()
+                for future in done:
+                    number, blades = chunk = pending.pop(future)
+                    try:
+                        content = self._content(future, asked, blades, control)
+                    except EngineGone as gone:
+                        again.append(chunk)
+                        self._lost(gone, control)
+                        continue
+                    self._keep(control, partial(store.put, number, content), len(content))
+                    folder.note(event="stored", chunk=number)
+                    tally.done += len(blades)
+                    tally.not_screened += len(rows_of(content)[1])
+                    self._tell(control, tally, "screening")
+        finally:
+            for future in pending:
+                future.cancel()
+
+    def _submit(self, asked: dict[str, Any], blades: list[BladeLine], control: Control) -> Future[bytes]:
+        payload = chunk_payload(asked, blades, self._limits)
+        return self._engine.submit(compute_chunk, payload, control.job.priority)
+
+    def _content(
+        self, future: Future[bytes], asked: dict[str, Any], blades: list[BladeLine], control: Control
+    ) -> bytes:
+        """The outcome of a chunk; where it kills its workers, of its blades one by one."""
+        try:
+            return self._engine.result(future)
+        except WorkerKilled as killed:
+            logger.error("a chunk of %s ends its workers (%s): blade by blade", blades[0].source, killed)
+        parts = []
+        for blade in blades:
+            alone = self._submit(asked, [blade], control)
+            while not wait([alone], _LOOK_EVERY_S).done:
+                control.check()
+            try:
+                parts.append(ChunkContent.from_bytes(self._engine.result(alone)))
+            except WorkerKilled:
+                lost = UnscreenedBlade(blade.index, blade.source, blade.name, _ALONE_KILLS)
+                parts.append(ChunkContent((), (lost,)))
+        return ChunkContent.joined(parts).to_bytes()
+
+    def _slots(self, control: Control) -> int:
+        """Workers there are; waits while there are none."""
+        while True:
+            try:
+                slots = self._engine.slots()
+            except EngineGone as gone:
+                self._lost(gone, control)
+                continue
+            if slots:
+                control.wait_for(None)
+                return slots
+            control.wait_for("a worker: the scheduler has none")
+            control.sleep(1.0)
+
+    def _lost(self, gone: RubscreenError, control: Control) -> None:
+        control.wait_for(f"the workers: {gone}")
+        control.sleep(1.0)
+
+    def _keep(self, control: Control, write: Callable[[], None], size: int = 0) -> None:
+        """Write, waiting for room on the disk as long as it takes: what was computed is not lost."""
+        began = time.monotonic()
+
+        def ready() -> str | None:
+            try:
+                check_room(control.folder, size, self._reserve)
+                write()
+            except NoRoom as full:
+                return f"room on the disk: {full}"
+            except OSError as error:
+                if not is_full(error):
+                    raise
+                return "room on the disk: it is full"
+            return None
+
+        control.until(ready)
+        if (waited := time.monotonic() - began) > 2.0:
+            logger.warning("job %s waited %.0f s for the disk", control.job.id, waited)
+
+    @staticmethod
+    def _tell(control: Control, tally: _Tally, stage: str) -> None:
+        control.report(total=tally.total, done=tally.done, not_screened=tally.not_screened, stage=stage)
