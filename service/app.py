@@ -11,7 +11,7 @@ from fastapi_offline import FastAPIOffline
 
 from sdm_core.version import __version__
 from service.answerer import Answerer
-from service.rest import access_log, errors, openapi
+from service.rest import access_log, errors, gate, openapi
 from service.rest.desk import Desk
 from service.rest.routes import blades, health, models, stability
 from service.settings import Settings
@@ -66,5 +66,6 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     app.include_router(health.router)
     errors.install(app)
     openapi.install(app)
+    app.add_middleware(gate.Gate)
     app.add_middleware(access_log.AccessLog)
     return app

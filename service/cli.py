@@ -14,6 +14,7 @@ from service.commands import (
     blade,
     boundary,
     demo,
+    keys,
     map,
     models,
     paper,
@@ -72,6 +73,7 @@ for command in (demo, serve, screen, assess, map, boundary, sensitivities, train
 
 app.add_typer(blade.app, name="blade")
 app.add_typer(models.app, name="models")
+app.add_typer(keys.app, name="keys")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -12,7 +13,7 @@ import orjson
 
 from sdm_core.blade import Blade, blade_to_dict
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import DamagedFile, RubscreenError
+from sdm_core.errors import DamagedFile, InvalidInput, RubscreenError
 from service.rest import replies
 from service.rest.errors import PROBLEM_JSON
 from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, SensitivityAnswers
@@ -48,6 +49,8 @@ class Client:
         Where it listens, e.g. ``http://127.0.0.1:8000``.
     timeout
         Seconds for one answer. Exact maps take long.
+    key
+        The API key, of a service that asks for one; RUBSCREEN_API_KEY when left out.
     http
         An HTTP client of one's own (certificates, proxies, tests) in place of `timeout`.
 
@@ -58,8 +61,16 @@ class Client:
     'http://127.0.0.1:8000'
     """
 
-    def __init__(self, base_url: str, timeout: float = 300.0, *, http: httpx.Client | None = None) -> None:
+    def __init__(
+        self,
+        base_url: str,
+        timeout: float = 300.0,
+        *,
+        key: str | None = None,
+        http: httpx.Client | None = None,
+    ) -> None:
         self.base_url = base_url.rstrip("/")
+        self._key = _sendable(os.environ.get("RUBSCREEN_API_KEY") if key is None else key)
         self._http = http or httpx.Client(timeout=timeout)
 
     def __enter__(self) -> Self:
@@ -175,6 +186,8 @@ class Client:
     ) -> httpx.Response:
         body = None if question is None else replies.to_json(question)
         headers = {"Accept": accept, "Content-Type": "application/json"}
+        if self._key:
+            headers["Authorization"] = f"Bearer {self._key}"
         try:
             response = self._http.request(method, self.base_url + path, content=body, headers=headers)
         except (httpx.HTTPError, httpx.InvalidURL) as error:
@@ -189,6 +202,21 @@ def _question(
 ) -> Json:
     said = {"policy": policy} if alpha is None else {"policy": policy, "alpha": alpha}
     return {"blade": blade_to_dict(blade), "contact": contact.to_dict(), **said, **asked}
+
+
+def _sendable(key: str | None) -> str | None:
+    """A key without the line break of the file it came from.
+
+    Raises
+    ------
+    InvalidInput
+        When no header can carry it; httpx would quote it in its own error.
+    """
+    key = None if key is None else key.strip()
+    if key and not (key.isascii() and key.isprintable()):
+        remedy = "give the key as `rubscreen keys create` printed it"
+        raise InvalidInput("key", "characters that no key has", remedy)
+    return key or None
 
 
 def _problem(response: httpx.Response) -> Json:

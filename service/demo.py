@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -166,17 +168,26 @@ class TimedMaps:
 
 @contextmanager
 def running_service(log: Path) -> Iterator[str]:
-    """A service on a free loopback port, ready; stopped again whatever happens.
+    """A service on a free loopback port, ready, with data of its own; stopped again whatever happens.
 
     Yields
     ------
     Its URL.
     """
     port = _free_port()
-    command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port)]
-    with _terminating(), log.open("wb") as sink:
+    # Neither the user's data nor keys: both go with the demonstration.
+    others = ("RUBSCREEN_DATABASE_URL", "RUBSCREEN_AUTH")
+    environment = {name: value for name, value in os.environ.items() if name not in others}
+    with (
+        _terminating(),
+        log.open("wb") as sink,
+        tempfile.TemporaryDirectory(prefix="rubscreen-demo-") as data,
+    ):
+        command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data", data]
         # A session of its own: Ctrl-C reaches this process alone, which then stops the service.
-        process = subprocess.Popen(command, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True)
+        process = subprocess.Popen(
+            command, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True, env=environment
+        )
         try:
             url = f"http://127.0.0.1:{port}"
             _wait_until_ready(url, process, log)

@@ -30,6 +30,18 @@ class Settings(BaseSettings):
     database_url
         ``postgresql://USER:PASSWORD@HOST/DATABASE``, which several replicas may share; None is SQLite in the
         data folder.
+    auth
+        ``on`` asks for keys, ``off`` lets everybody in. ``auto`` lets in whoever is on this machine while the
+        service listens on the loopback alone, and asks for keys otherwise.
+    requests_per_minute
+        Requests of one key in a minute, on each replica; without keys, of one address. None is 6000, and as
+        many as it likes for this machine itself while no keys are asked for.
+    max_concurrent_requests
+        Requests of one key, or address, answered at the same time on each replica. None is 32, likewise.
+    max_active_jobs
+        Jobs of one key that wait or run.
+    max_queued_jobs
+        Jobs of all keys that wait or run.
     max_body_bytes
         Largest request body; longer ones are refused while they arrive.
     body_timeout_s
@@ -76,6 +88,11 @@ class Settings(BaseSettings):
     served_answers_folder: Path | None = None
     data_folder: Path | None = None
     database_url: str | None = None
+    auth: Literal["auto", "on", "off"] = "auto"
+    requests_per_minute: Count | None = None
+    max_concurrent_requests: Count | None = None
+    max_active_jobs: Count = 20
+    max_queued_jobs: Count = 1000
     max_body_bytes: Count = 16 * 2**20
     body_timeout_s: Seconds = 60.0
     max_points: Count = 250_000
@@ -94,3 +111,12 @@ class Settings(BaseSettings):
     deadline_s: Seconds = 300.0
     shutdown_s: Count = 30
     log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
+
+
+def default_data_folder() -> Path:
+    """Where the command line keeps data unless it is told: ``rubscreen`` below ``XDG_DATA_HOME``.
+
+    As the XDG base directory specification says, a relative XDG_DATA_HOME does not count.
+    """
+    told = Path(os.environ.get("XDG_DATA_HOME", ""))
+    return (told if told.is_absolute() else Path.home() / ".local" / "share") / "rubscreen"

@@ -112,6 +112,16 @@ ModelsOption = Annotated[
         show_default=False,
     ),
 ]
+DataOption = Annotated[
+    str | None,
+    typer.Option(
+        "--data",
+        metavar="FOLDER",
+        help="Where the service keeps keys and jobs. Left out: RUBSCREEN_DATA_FOLDER, else "
+        "~/.local/share/rubscreen. RUBSCREEN_DATABASE_URL puts its database elsewhere.",
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[
     str | None,
     typer.Option(

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.commands.admission import settled
+from service.commands.options import DataOption
+
 if TYPE_CHECKING:
     from service.settings import Settings
 
@@ -32,17 +35,25 @@ def run(
             show_default=False,
         ),
     ] = None,
+    data: DataOption = None,
+    open_to_all: Annotated[
+        bool, typer.Option("--open", help="Ask for no keys, though other machines can reach the address.")
+    ] = False,
 ) -> None:
-    """Run the REST service until it is interrupted. Its settings are RUBSCREEN_... environment variables."""
+    """Run the REST service until it is interrupted. Its settings are RUBSCREEN_... environment variables.
+
+    On an address that other machines can reach it asks for keys: see `rubscreen keys`.
+    """
     import uvicorn
 
     from service.app import create_app
     from service.commands.outputs import check_writable
 
-    settings = settings_from(models, keep_answers)
+    settings = settings_from(models, keep_answers, data)
     if settings.served_answers_folder is not None:
         check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
+    settings = settled(settings, host, listening.getsockname()[0], open_to_all=open_to_all)
     app = create_app(settings)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
     typer.echo(
@@ -59,8 +70,10 @@ def run(
         uvicorn.Server(config).run(sockets=[listening])
 
 
-def settings_from(models: str | None, keep_answers: str | None = None) -> Settings:
-    """The settings of the environment, and folders over theirs.
+def settings_from(
+    models: str | None = None, keep_answers: str | None = None, data: str | None = None
+) -> Settings:
+    """The settings of the environment, and folders over theirs; with a data folder in any case.
 
     Raises
     ------
@@ -70,16 +83,19 @@ def settings_from(models: str | None, keep_answers: str | None = None) -> Settin
     from pydantic import ValidationError
 
     from sdm_core.errors import InvalidInput
-    from service.settings import Settings
+    from service.settings import Settings, default_data_folder
 
-    folders = {"models_folder": models, "served_answers_folder": keep_answers}
+    folders = {"models_folder": models, "served_answers_folder": keep_answers, "data_folder": data}
     given = {name: Path(folder) for name, folder in folders.items() if folder is not None}
     try:
-        return Settings(**given)  # type: ignore[arg-type]
+        settings = Settings(**given)  # type: ignore[arg-type]
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         name = "RUBSCREEN_" + "_".join(str(part) for part in fault["loc"]).upper()
         raise InvalidInput(name, fault["input"], fault["msg"]) from None
+    if settings.data_folder is None:
+        settings = settings.model_copy(update={"data_folder": default_data_folder()})
+    return settings
 
 
 def _listening(host: str, port: int) -> socket.socket:

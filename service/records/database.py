@@ -117,6 +117,22 @@ class Database:
                 raise InvalidInput("database_url", f"{self.shown}, version {found}", remedy)
 
 
+def open_database(data_folder: Path, url: str | None = None) -> Database:
+    """The database of a data folder, which is made where it is not there yet.
+
+    Raises
+    ------
+    InvalidInput
+        When the folder cannot be made, or the database cannot be used.
+    """
+    try:
+        data_folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        remedy = f"it cannot be made ({error.strerror}): give another folder"
+        raise InvalidInput("data_folder", str(data_folder), remedy) from None
+    return Database(database_url(url, data_folder))
+
+
 def _engine(url: URL) -> Engine:
     if not url.drivername.startswith("sqlite"):
         # A connection that the server closed meanwhile is found out before it is used.

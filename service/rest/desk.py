@@ -7,11 +7,11 @@ from pathlib import Path
 
 from anyio import CapacityLimiter, to_thread
 
-from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
-from service.records.database import Database, database_url
+from service.records.database import Database, open_database
 from service.rest.active_model import ActiveModel, Answering, WatchedModel
 from service.rest.errors import NotReady
+from service.rest.gate import Access
 from service.rest.limits import WorkQueue
 from service.rest.self_check import self_check
 from service.settings import Settings
@@ -34,6 +34,8 @@ class Desk:
         Where exact answers go for retraining; None where they are not kept.
     database
         Keys, jobs and audits; None without a data folder.
+    access
+        Who may come in, and how often.
     """
 
     settings: Settings
@@ -41,6 +43,7 @@ class Desk:
     work: WorkQueue
     kept: ServedAnswers | None
     database: Database | None
+    access: Access
     _checking: CapacityLimiter
 
     @classmethod
@@ -50,9 +53,12 @@ class Desk:
         Raises
         ------
         InvalidInput
-            When the folder for exact answers or for data cannot be made, or the database cannot be used.
+            When the folder for exact answers or for data cannot be made, the database cannot be used, or keys
+            are asked for without it.
         """
-        database = _database(settings)
+        folder = settings.data_folder
+        database = None if folder is None else open_database(folder, settings.database_url)
+        access = Access.opened(settings, database)
         kept, model = None, ActiveModel(Answering(screener)) if screener is not None else None
         if model is None:
             if settings.served_answers_folder is not None:
@@ -60,7 +66,7 @@ class Desk:
             observer = None if kept is None else kept.keep
             model = WatchedModel(_folder(settings), settings.models_poll_s, observer)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
-        return cls(settings, model, work, kept, database, CapacityLimiter(1))
+        return cls(settings, model, work, kept, database, access, CapacityLimiter(1))
 
     def close(self) -> None:
         """Stop what still runs, and write what is to be kept."""
@@ -68,6 +74,7 @@ class Desk:
         self.model.close()
         if self.kept is not None:
             self.kept.close()
+        self.access.close()
         if self.database is not None:
             self.database.close()
 
@@ -124,15 +131,3 @@ class Desk:
 
 def _folder(settings: Settings) -> Path:
     return settings.models_folder or SHIPPED
-
-
-def _database(settings: Settings) -> Database | None:
-    folder = settings.data_folder
-    if folder is None:
-        return None
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        remedy = f"it cannot be made ({error.strerror}): give another folder"
-        raise InvalidInput("data_folder", str(folder), remedy) from None
-    return Database(database_url(settings.database_url, folder))

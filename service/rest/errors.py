@@ -22,7 +22,10 @@ from sdm_core.errors import (
     OutOfSpeedRange,
     TooMuchWork,
 )
+from service.rest.access import NotAllowed, NotAuthenticated
+from service.rest.job_quota import TooManyJobs
 from service.rest.limits import Busy, SlowBody, TooLarge
+from service.rest.rate_limits import TooManyRequests
 
 PROBLEM_JSON = "application/problem+json"
 logger = logging.getLogger("rubscreen.service")
@@ -53,6 +56,10 @@ class Kind:
 
 # The first class that fits counts, so the narrower ones stand first.
 KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
+    (NotAuthenticated, Kind("not-authenticated", "It is not known who asks", 401)),
+    (NotAllowed, Kind("not-allowed", "The caller may not do this", 403)),
+    (TooManyJobs, Kind("too-many-jobs", "The caller has as many jobs as it may", 429)),
+    (TooManyRequests, Kind("too-many-requests", "The caller sends more requests than it may", 429)),
     (TooLarge, Kind("too-large", "The request is too large", 413)),
     (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
     (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),
@@ -115,9 +122,15 @@ def unexpected(scope: Mapping[str, Any], error: Exception) -> Problem:
     )
 
 
+def problem_of(error: InvalidInput, scope: Mapping[str, Any]) -> Problem:
+    """The problem document that says what is wrong, with the headers that go with it."""
+    headers = getattr(error, "headers", None)
+    return Problem(kind_of(error), scope, error.field, error.value, error.remedy, headers)
+
+
 def _answer_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
-    return Problem(kind_of(error), request.scope, error.field, error.value, error.remedy)
+    return problem_of(error, request.scope)
 
 
 def _answer_http(request: Request, error: Exception) -> Response:

@@ -10,6 +10,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.profile_schema import PROFILE
@@ -21,12 +22,22 @@ Json = dict[str, Any]
 
 _REF = "#/components/schemas/{model}"
 _MEANINGS = {
+    401: "No key came, or one that is not known, expired or revoked; where the service asks for keys.",
+    403: "The key's role is not enough.",
     406: "No form of the answer is one the client accepts.",
     408: "The body did not arrive in time.",
     413: "The body, an array or the number of points is over the limit.",
     422: "The request cannot be used; the problem names the field, its value and the remedy.",
+    429: "More requests or jobs than the caller may have; Retry-After says when to come back.",
     500: "A fault of the service.",
     503: "The service cannot answer now.",
+}
+_KEY = (
+    "`rub_<id>_<secret>`, as `rubscreen keys create` prints it. A service of one's own machine asks for none."
+)
+_SECURITY = {
+    "bearer": {"type": "http", "scheme": "bearer", "bearerFormat": "rub_<id>_<secret>", "description": _KEY},
+    "header": {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": _KEY},
 }
 
 
@@ -51,11 +62,25 @@ def install(app: FastAPI) -> None:
 
     def with_components() -> Json:
         if app.openapi_schema is None:
-            generate()["components"]["schemas"] |= _components()
+            document = generate()
+            document["components"]["schemas"] |= _components()
+            _guards(app, document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 
     app.openapi = with_components  # type: ignore[method-assign]
+
+
+def _guards(app: FastAPI, document: Json) -> None:
+    """Say what every guarded route asks for, and how it refuses."""
+    document["components"]["securitySchemes"] = _SECURITY
+    for route, role in guarded_routes(app.routes):
+        for method in route.methods if route.include_in_schema else ():
+            operation = document["paths"][route.path_format][method.lower()]
+            operation["security"] = [{name: []} for name in _SECURITY]
+            operation["description"] = f"{operation.get('description', '')}\n\nNeeds {needed(role)}.".strip()
+            refusals = {str(status): problem for status, problem in problems(401, 403, 429).items()}
+            operation["responses"] = dict(sorted((refusals | operation["responses"]).items()))
 
 
 def _components() -> Json:

@@ -7,6 +7,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.rest import replies
+from service.rest.access import READ
 from service.rest.blade_question import BladeQuestion
 from service.rest.blade_reply import built_reply, checked_reply
 from service.rest.body import parsed
@@ -15,7 +16,7 @@ from service.rest.profile_schema import BLADES_EXAMPLE
 from service.rest.routes.request import TheBody, the_desk
 from service.rest.schemas import BladeReply
 
-router = APIRouter(prefix="/v1", tags=["blades"])
+router = APIRouter(prefix="/v1", tags=["blades"], dependencies=[READ])
 
 
 @router.post(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter
 from starlette.requests import Request
 
+from service.rest.access import READ
 from service.rest.openapi import problems
 from service.rest.routes.request import the_desk
 from service.rest.schemas import Model, Models
 
-router = APIRouter(prefix="/v1", tags=["models"])
+router = APIRouter(prefix="/v1", tags=["models"], dependencies=[READ])
 
 
 @router.get("/models", responses=problems(500))

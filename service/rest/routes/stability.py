@@ -8,6 +8,7 @@ from starlette.responses import Response
 
 from service.answerer import Answerer
 from service.rest import replies
+from service.rest.access import READ
 from service.rest.body import parsed
 from service.rest.negotiation import best_form
 from service.rest.openapi import problems, request_body
@@ -26,7 +27,7 @@ JSON, NPZ, BYTES, PNG = "application/json", "application/x-npz", "application/oc
 MAP_FORMS = (JSON, NPZ, BYTES, PNG)
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
-router = APIRouter(prefix="/v1", tags=["stability"])
+router = APIRouter(prefix="/v1", tags=["stability"], dependencies=[READ])
 
 
 @router.post(

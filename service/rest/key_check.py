@@ -1,0 +1,129 @@
+"""Whether a key that came with a request is good: asked of the database, and known for a few seconds."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from anyio import to_thread
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.records.keys import LAST_USE_EVERY_S, ApiKey, KeyStore, split_key
+from service.rest.access import HOW_TO_SEND, NotAuthenticated
+from service.rest.errors import NotReady
+
+# For so long a key is not asked for again: with the time that asking takes, a revocation counts within 5 s.
+KNOWN_FOR_S = 3.0
+MOST_KNOWN = 10_000
+
+logger = logging.getLogger("rubscreen.service")
+
+
+@dataclass
+class _Known:
+    """A key as the database had it, when, and when its last use was put on record."""
+
+    key: ApiKey
+    read_at: float
+    used_at: float | None = None
+
+
+class KeyCheck:
+    """Checks keys.
+
+    Only keys that are on record are remembered, so that trying others fills no memory.
+
+    Parameters
+    ----------
+    store
+        Where the keys are.
+    clock
+        Seconds since whenever, never going back.
+    """
+
+    def __init__(self, store: KeyStore, clock: Callable[[], float] = time.monotonic) -> None:
+        self._store, self._clock = store, clock
+        self._known: dict[str, _Known] = {}
+        self._asking = asyncio.Lock()
+        # One thread for writing last uses: no request waits for it, or fails with it.
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="key uses")
+
+    def close(self) -> None:
+        """Stop writing last uses."""
+        self._writer.shutdown(cancel_futures=True)
+
+    def recognises(self, text: str) -> bool:
+        """Whether this very key was on record the last time it was asked for, at no cost."""
+        parts = split_key(text)
+        known = None if parts is None else self._known.get(parts[0])
+        return parts is not None and known is not None and known.key.opened_by(parts[1])
+
+    async def check(self, text: str) -> ApiKey:
+        """The key whose text came with a request.
+
+        Raises
+        ------
+        NotAuthenticated
+            When it is no key, unknown, expired or revoked. Neither id nor text is quoted before the secret
+            proved right.
+        NotReady
+            When the database does not answer.
+        """
+        parts = split_key(text)
+        if parts is None:
+            remedy = "send the whole key, rub_ and what follows, as `rubscreen keys create` printed it"
+            raise NotAuthenticated("key", "not a key", remedy)
+        key_id, secret = parts
+        known = await self._read(key_id)
+        if known is None or not known.key.opened_by(secret):
+            raise NotAuthenticated("key", "unknown", f"send a key of this service, as {HOW_TO_SEND}")
+        now = time.time()
+        state = known.key.state(now)
+        if state != "usable":
+            shown = f"{known.key.id} ({known.key.name}), {state}"
+            raise NotAuthenticated("key", shown, "ask for a new one: `rubscreen keys create`")
+        self._note_use(known, now)
+        return known.key
+
+    async def _read(self, key_id: str) -> _Known | None:
+        if self._is_fresh(known := self._known.get(key_id)):
+            return known
+        async with self._asking:  # a hundred requests at once ask the database once
+            if self._is_fresh(known := self._known.get(key_id)):
+                return known
+            at = self._clock()  # before it is read: a change after that is seen in time
+            try:
+                key = await to_thread.run_sync(self._store.find, key_id)
+            except SQLAlchemyError as error:
+                logger.error("keys cannot be read: %s", error)
+                raise NotReady("keys", "the database does not answer", "send the request again") from None
+            if key is None:
+                self._known.pop(key_id, None)
+                return None
+            used_at = key.last_used_at if known is None else known.used_at
+            if len(self._known) >= MOST_KNOWN:
+                self._known.pop(next(iter(self._known)))
+            self._known[key_id] = found = _Known(key, at, used_at)
+            return found
+
+    def _is_fresh(self, known: _Known | None) -> bool:
+        return known is not None and self._clock() - known.read_at < KNOWN_FOR_S
+
+    def _note_use(self, known: _Known, now: float) -> None:
+        if known.used_at is not None and now - known.used_at < LAST_USE_EVERY_S:
+            return
+        known.used_at = now
+        try:
+            self._writer.submit(self._write_use, known.key.id, now)
+        except RuntimeError:  # the service is closing
+            return
+
+    def _write_use(self, key_id: str, at: float) -> None:
+        try:
+            self._store.used(key_id, at)
+        except SQLAlchemyError as error:
+            logger.warning("the last use of key %s cannot be written: %s", key_id, error)
