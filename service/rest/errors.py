@@ -39,6 +39,10 @@ class NotAcceptable(InvalidInput):
     """No form of the answer is one the client takes."""
 
 
+class UnsupportedForm(InvalidInput):
+    """The body has a form that is not taken here."""
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of problem: the last part of its `type`, its title and its HTTP status."""
@@ -67,6 +71,7 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (NotReady, Kind("not-ready", "The service is not ready to answer this", 503, retry_after_s=30)),
     (DamagedFile, Kind("damaged-file", "A file of the service is damaged", 503)),
     (NotAcceptable, Kind("not-acceptable", "No such form of the answer", 406)),
+    (UnsupportedForm, Kind("unsupported-media-type", "No such form of the body is taken", 415)),
     (OutOfSpeedRange, Kind("out-of-speed-range", "The modal data do not reach this speed", 422)),
     (ModesNotTracked, Kind("modes-not-tracked", "Modes cannot be followed between the states", 422)),
     (InvalidInput, Kind("invalid-input", "The request cannot be used", 422)),

@@ -29,6 +29,22 @@ def best_form(accept: str | None, offered: Sequence[str]) -> str:
     return offered[liking.index(max(liking))]
 
 
+def form_or_first(accept: str | None, offered: Sequence[str]) -> str:
+    """As `best_form`, but the first where `accept` takes none.
+
+    For paths that answered JSON whatever was accepted before they had other forms.
+
+    Examples
+    --------
+    >>> form_or_first("text/html", ["application/json", "application/x-npz"])
+    'application/json'
+    """
+    try:
+        return best_form(accept, offered)
+    except NotAcceptable:
+        return offered[0]
+
+
 def _media_range(text: str) -> tuple[str, float]:
     name, *parameters = (part.strip().lower() for part in text.split(";"))
     for parameter in parameters:

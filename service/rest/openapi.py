@@ -13,6 +13,7 @@ from pydantic.json_schema import models_json_schema
 from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
+from service.rest.forms.media_types import ARROW, NPZ
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
@@ -21,12 +22,19 @@ from service.rest.schemas import ProblemDocument
 Json = dict[str, Any]
 
 _REF = "#/components/schemas/{model}"
+_BULK = {
+    NPZ: "numpy.savez of the question's long arrays (`speed_hz`, `ke`) as numbers and of the rest of it "
+    "as JSON text in `question`. Unpacked no longer than a plain body may be.",
+    ARROW: "Arrow IPC stream, uncompressed: the question's long arrays as columns, the rest of it as JSON in "
+    "the schema's metadata under `rubscreen.question`.",
+}
 _MEANINGS = {
     401: "No key came, or one that is not known, expired or revoked; where the service asks for keys.",
     403: "The key's role is not enough.",
     406: "No form of the answer is one the client accepts.",
     408: "The body did not arrive in time.",
     413: "The body, an array or the number of points is over the limit.",
+    415: "The body has a form that is not taken here.",
     422: "The request cannot be used; the problem names the field, its value and the remedy.",
     429: "More requests or jobs than the caller may have; Retry-After says when to come back.",
     500: "A fault of the service.",
@@ -50,10 +58,13 @@ def problems(*statuses: int) -> dict[int | str, Json]:
     }
 
 
-def request_body(question: type[BaseModel], example: Json) -> Json:
-    """OpenAPI request body, for a route that parses it itself."""
-    content = {"schema": {"$ref": _REF.format(model=question.__name__)}, "example": example}
-    return {"requestBody": {"required": True, "content": {"application/json": content}}}
+def request_body(question: type[BaseModel], example: Json, *binary: str) -> Json:
+    """OpenAPI request body, for a route that parses it itself; `binary` are the other forms it takes."""
+    content: Json = {"application/json": {"schema": {"$ref": _REF.format(model=question.__name__)}}}
+    content["application/json"]["example"] = example
+    for form in binary:
+        content[form] = {"schema": {"type": "string", "format": "binary", "description": _BULK[form]}}
+    return {"requestBody": {"required": True, "content": content}}
 
 
 def install(app: FastAPI) -> None:

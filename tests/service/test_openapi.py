@@ -51,7 +51,7 @@ def test_every_path_of_the_contract_is_there(document):
 def test_every_refusal_is_documented_as_a_problem(document):
     for path in ("/v1/stability", "/v1/boundary", "/v1/sensitivities", "/v1/map"):
         responses = document["paths"][path]["post"]["responses"]
-        for status in ("408", "413", "422", "500", "503"):
+        for status in ("408", "413", "415", "422", "500", "503"):
             assert list(responses[status]["content"]) == ["application/problem+json"]
     forms = document["paths"]["/v1/map"]["post"]["responses"]["200"]["content"]
     assert set(forms) == {"application/json", "application/x-npz", "application/octet-stream", "image/png"}

@@ -13,7 +13,7 @@ from service.rest.blade_reply import built_reply, checked_reply
 from service.rest.body import parsed
 from service.rest.openapi import problems, request_body
 from service.rest.profile_schema import BLADES_EXAMPLE
-from service.rest.routes.request import TheBody, the_desk
+from service.rest.routes.request import TheJson, the_desk
 from service.rest.schemas import BladeReply
 
 router = APIRouter(prefix="/v1", tags=["blades"], dependencies=[READ])
@@ -23,9 +23,9 @@ router = APIRouter(prefix="/v1", tags=["blades"], dependencies=[READ])
     "/blades",
     response_model=BladeReply,
     openapi_extra=request_body(BladeQuestion, BLADES_EXAMPLE),
-    responses=problems(408, 413, 422, 500, 503),
+    responses=problems(408, 413, 415, 422, 500, 503),
 )
-async def make_blade(request: Request, body: TheBody) -> Response:
+async def make_blade(request: Request, body: TheJson) -> Response:
     """Build a blade file from a profile by finite elements, or check one made of modal data."""
     desk = the_desk(request)
 

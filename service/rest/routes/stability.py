@@ -9,8 +9,9 @@ from starlette.responses import Response
 from service.answerer import Answerer
 from service.rest import replies
 from service.rest.access import READ
-from service.rest.body import parsed
-from service.rest.negotiation import best_form
+from service.rest.forms.media_types import ARROW, BULK, BYTES, JSON, NPZ, PNG
+from service.rest.forms.npz_replies import points_to_npz, sensitivities_to_npz
+from service.rest.negotiation import best_form, form_or_first
 from service.rest.openapi import problems, request_body
 from service.rest.question_schemas import (
     BOUNDARY_EXAMPLE,
@@ -19,12 +20,13 @@ from service.rest.question_schemas import (
     SENSITIVITIES_EXAMPLE,
 )
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
-from service.rest.routes.request import TheBody, the_desk
+from service.rest.routes.request import TheGrid, TheQuestion, the_desk
 from service.rest.schemas import BoundaryReply, MapReply, PointsReply, SensitivitiesReply
-from training.answers import MapAnswers
+from training.answers import MapAnswers, PointAnswers
 
-JSON, NPZ, BYTES, PNG = "application/json", "application/x-npz", "application/octet-stream", "image/png"
+POINTS_FORMS, SENSITIVITIES_FORMS = (JSON, *BULK), (JSON, NPZ)
 MAP_FORMS = (JSON, NPZ, BYTES, PNG)
+VARY = {"Vary": "Accept"}
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
 router = APIRouter(prefix="/v1", tags=["stability"], dependencies=[READ])
@@ -33,34 +35,41 @@ router = APIRouter(prefix="/v1", tags=["stability"], dependencies=[READ])
 @router.post(
     "/stability",
     response_model=PointsReply,
-    openapi_extra=request_body(PointsQuestion, POINTS_EXAMPLE),
-    responses=problems(408, 413, 422, 500, 503),
+    openapi_extra=request_body(PointsQuestion, POINTS_EXAMPLE, *BULK),
+    responses={
+        200: {"content": dict.fromkeys(BULK, _BINARY)},
+        **problems(408, 413, 415, 422, 500, 503),
+    },
 )
-async def is_it_stable(request: Request, body: TheBody) -> Response:
-    """Is the blade stable at these points (speed, K_e)?"""
+async def is_it_stable(request: Request, body: TheQuestion) -> Response:
+    """Is the blade stable at these points (speed, K_e)?
+
+    For many points question and answer may be npz or an Arrow stream, by `Content-Type` and `Accept`.
+    """
     desk = the_desk(request)
+    form = form_or_first(request.headers.get("accept"), POINTS_FORMS)
 
     def answer() -> bytes:
-        ask = PointsQuestion.read(parsed(body), desk.settings)
+        ask = PointsQuestion.read(body.parsed(desk.settings), desk.settings)
         answerer = desk.answerer(ask.policy)
         found = answerer.points(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy, ask.alpha)
-        return replies.to_json(replies.points_to_dict(found))
+        return _points(found, form)
 
-    return Response(await desk.work.run(answer, request), media_type=JSON)
+    return Response(await desk.work.run(answer, request), media_type=form, headers=VARY)
 
 
 @router.post(
     "/boundary",
     response_model=BoundaryReply,
-    openapi_extra=request_body(BoundaryQuestion, BOUNDARY_EXAMPLE),
-    responses=problems(408, 413, 422, 500, 503),
+    openapi_extra=request_body(BoundaryQuestion, BOUNDARY_EXAMPLE, *BULK),
+    responses=problems(408, 413, 415, 422, 500, 503),
 )
-async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
+async def where_is_the_boundary(request: Request, body: TheQuestion) -> Response:
     """From which K_e on is the blade unstable at these speeds?"""
     desk = the_desk(request)
 
     def answer() -> bytes:
-        ask = BoundaryQuestion.read(parsed(body), desk.settings)
+        ask = BoundaryQuestion.read(body.parsed(desk.settings), desk.settings)
         answerer = desk.answerer(ask.policy)
         found = answerer.boundary(ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy, ask.alpha)
         return replies.to_json(replies.boundary_to_dict(found))
@@ -71,34 +80,40 @@ async def where_is_the_boundary(request: Request, body: TheBody) -> Response:
 @router.post(
     "/sensitivities",
     response_model=SensitivitiesReply,
-    openapi_extra=request_body(SensitivitiesQuestion, SENSITIVITIES_EXAMPLE),
-    responses=problems(408, 413, 422, 500, 503),
+    openapi_extra=request_body(SensitivitiesQuestion, SENSITIVITIES_EXAMPLE, *BULK),
+    responses={200: {"content": {NPZ: _BINARY}}, **problems(408, 413, 415, 422, 500, 503)},
 )
-async def what_moves_the_boundary(request: Request, body: TheBody) -> Response:
-    """By how much do frequencies, damping, amplitudes, weights, speed and arcs move the boundary?"""
+async def what_moves_the_boundary(request: Request, body: TheQuestion) -> Response:
+    """By how much do frequencies, damping, amplitudes, weights, speed and arcs move the boundary?
+
+    By `Accept` as JSON or npz.
+    """
     desk = the_desk(request)
+    form = form_or_first(request.headers.get("accept"), SENSITIVITIES_FORMS)
 
     def answer() -> bytes:
-        ask = SensitivitiesQuestion.read(parsed(body), desk.settings)
+        ask = SensitivitiesQuestion.read(body.parsed(desk.settings), desk.settings)
         answerer = desk.answerer(ask.policy)
         found = answerer.sensitivities(
             ask.blade, ask.contact, ask.speed_hz, ask.ke_max, ask.policy, ask.alpha
         )
+        if form == NPZ:
+            return sensitivities_to_npz(found)
         return replies.to_json(replies.sensitivities_to_dict(found))
 
-    return Response(await desk.work.run(answer, request), media_type=JSON)
+    return Response(await desk.work.run(answer, request), media_type=form, headers=VARY)
 
 
 @router.post(
     "/map",
     response_model=MapReply,
-    openapi_extra=request_body(MapQuestion, MAP_EXAMPLE),
+    openapi_extra=request_body(MapQuestion, MAP_EXAMPLE, NPZ),
     responses={
         200: {"content": {NPZ: _BINARY, BYTES: _BINARY, PNG: _BINARY}},
-        **problems(406, 408, 413, 422, 500, 503),
+        **problems(406, 408, 413, 415, 422, 500, 503),
     },
 )
-async def map_of_stability(request: Request, body: TheBody) -> Response:
+async def map_of_stability(request: Request, body: TheGrid) -> Response:
     """Where in the plane of speed and K_e is the blade stable?
 
     By `Accept`: JSON, the arrays as npz (numpy; no pickle), or a chart as PNG.
@@ -107,7 +122,7 @@ async def map_of_stability(request: Request, body: TheBody) -> Response:
     form = best_form(request.headers.get("accept"), MAP_FORMS)
 
     def answer() -> bytes:
-        ask = MapQuestion.read(parsed(body), desk.settings)
+        ask = MapQuestion.read(body.parsed(desk.settings), desk.settings)
         if form == PNG:
             ask.check_chartable()
         answerer = desk.answerer(ask.policy)
@@ -118,7 +133,18 @@ async def map_of_stability(request: Request, body: TheBody) -> Response:
             return _chart(answerer, ask, found)
         return replies.map_to_npz(found)
 
-    return Response(await desk.work.run(answer, request), media_type=form, headers={"Vary": "Accept"})
+    return Response(await desk.work.run(answer, request), media_type=form, headers=VARY)
+
+
+def _points(found: PointAnswers, form: str) -> bytes:
+    if form == NPZ:
+        return points_to_npz(found)
+    if form == ARROW:
+        # Here, not above: a service that is never asked for Arrow need not load it.
+        from service.rest.forms.arrow_replies import points_to_arrow
+
+        return points_to_arrow(found)
+    return replies.to_json(replies.points_to_dict(found))
 
 
 def _chart(answerer: Answerer, ask: MapQuestion, found: MapAnswers) -> bytes:

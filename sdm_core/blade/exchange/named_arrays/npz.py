@@ -93,12 +93,29 @@ def npz_arrays(path: Path) -> dict[str, np.ndarray]:
                     f"{path.name}: {member.filename}", "no array", "this is no .npz of rubscreen"
                 )
             # Reading a member whole also checks its checksum.
-            out[member.filename.removesuffix(".npy")] = _array(path, member.filename, archive.read(member))
+            out[member.filename.removesuffix(".npy")] = npy_array(
+                f"{path.name}: {member.filename}", archive.read(member)
+            )
     return out
 
 
-def _array(path: Path, name: str, data: bytes) -> np.ndarray:
-    where = f"{path.name}: {name}"
+def npy_array(where: str, data: bytes) -> np.ndarray:
+    """The array in the content of a .npy file: numbers or text, never Python objects.
+
+    Its declared size is checked against the bytes there are before room is made for it.
+
+    Parameters
+    ----------
+    where
+        What an error is to name.
+
+    Raises
+    ------
+    DamagedFile
+        For another format, objects, or sizes that do not fit.
+    ValueError, SyntaxError, OSError
+        As numpy, for a header that is none.
+    """
     stream = io.BytesIO(data)
     version = np.lib.format.read_magic(stream)
     if version == (1, 0):
