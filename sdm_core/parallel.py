@@ -51,8 +51,8 @@ def checked_workers(workers: Any) -> int:
     return min(int(workers), max(available_cores(), 2))
 
 
-def _leave_with(parent: int) -> None:
-    """Let this worker end when the process that started it has ended, however it did."""
+def leave_with(parent: int) -> None:
+    """Let this process end when the one that started it, `parent`, has ended, however it did."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -83,7 +83,7 @@ def shared(
             max_workers=workers,
             timeout=_IDLE_S,
             env=_ALONE,
-            initializer=_leave_with,
+            initializer=leave_with,
             initargs=(os.getpid(),),
         )
         pending: dict[Future[Result], int] = {}

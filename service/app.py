@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TypedDict
 
+from anyio import CancelScope, to_thread
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
@@ -13,7 +14,7 @@ from sdm_core.version import __version__
 from service.answerer import Answerer
 from service.rest import access_log, errors, gate, openapi
 from service.rest.desk import Desk
-from service.rest.routes import blades, health, models, stability
+from service.rest.routes import blades, health, models, screenings, stability, uploads
 from service.settings import Settings
 
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
@@ -42,11 +43,13 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[State]:
         access_log.configure(settings.log_level)
-        desk = Desk.opened(settings, screener)
+        # In a thread: the database and the queue of jobs do not open on the event loop.
+        desk = await to_thread.run_sync(Desk.opened, settings, screener)
         try:
             yield {"desk": desk}
         finally:
-            desk.close()
+            with CancelScope(shield=True):
+                await to_thread.run_sync(desk.close)
 
     # Not plain FastAPI, whose /docs loads its scripts from the internet.
     app: FastAPI = FastAPIOffline(
@@ -63,6 +66,8 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     app.include_router(stability.router)
     app.include_router(blades.router)
     app.include_router(models.router)
+    app.include_router(screenings.router)
+    app.include_router(uploads.router)
     app.include_router(health.router)
     errors.install(app)
     openapi.install(app)

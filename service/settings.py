@@ -42,6 +42,28 @@ class Settings(BaseSettings):
         Jobs of one key that wait or run.
     max_queued_jobs
         Jobs of all keys that wait or run.
+    run_jobs
+        Whether this process runs jobs; without, it takes them for others that share the database.
+    jobs_at_once
+        Screenings this process runs at the same time; they share its workers by priority.
+    job_lease_s
+        Time after which the jobs of a replica that says nothing any more are taken over.
+    engine_workers
+        Processes that compute the chunks of jobs, where there is no `scheduler`.
+    scheduler
+        A dask scheduler that computes them instead, ``tcp://HOST:PORT`` or ``tls://HOST:PORT``.
+    scheduler_tls_ca, scheduler_tls_cert, scheduler_tls_key
+        Files (PEM) by which the scheduler and this service know each other.
+    min_free_bytes
+        Room left free on the data folder's disk: jobs wait, and new ones are refused, before it is used up.
+    max_upload_bytes
+        Of one file of blades.
+    max_job_blades
+        Of one screening.
+    max_job_contacts
+        Of one screening.
+    keep_jobs_days, keep_uploads_days
+        Jobs that are over, and uploads, are deleted after so many days; 0 keeps them for good.
     max_body_bytes
         Largest request body; longer ones are refused while they arrive.
     body_timeout_s
@@ -93,6 +115,20 @@ class Settings(BaseSettings):
     max_concurrent_requests: Count | None = None
     max_active_jobs: Count = 20
     max_queued_jobs: Count = 1000
+    run_jobs: bool = True
+    jobs_at_once: Count = 4
+    job_lease_s: Seconds = 30.0
+    engine_workers: Count = os.cpu_count() or 1
+    scheduler: str | None = None
+    scheduler_tls_ca: Path | None = None
+    scheduler_tls_cert: Path | None = None
+    scheduler_tls_key: Path | None = None
+    min_free_bytes: Annotated[int, Ge(0)] = 256 * 2**20
+    max_upload_bytes: Count = 512 * 2**20
+    max_job_blades: Count = 20_000
+    max_job_contacts: Count = 20
+    keep_jobs_days: Annotated[float, Ge(0)] = 90.0
+    keep_uploads_days: Annotated[float, Ge(0)] = 7.0
     max_body_bytes: Count = 16 * 2**20
     body_timeout_s: Seconds = 60.0
     max_points: Count = 250_000

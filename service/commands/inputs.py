@@ -155,7 +155,7 @@ def check_work(
     """
     from sdm_core.lobe_tips import lobe_grid
     from service.commands.serve import settings_from
-    from service.rest.limits import check_reach
+    from service.sizes import check_reach
 
     try:
         if here:

@@ -10,14 +10,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from sdm_core.errors import InvalidInput
+from service.jobs.errors import NoRoom
 
 INCOMING, REMOVED = ".incoming-", ".removed-"
 _FULL = (errno.ENOSPC, errno.EDQUOT)
-
-
-class NoRoom(InvalidInput):
-    """The disk is full, or about to be."""
 
 
 def is_full(error: OSError) -> bool:

@@ -17,8 +17,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from sdm_core.errors import Cancelled, InvalidInput
 from service.jobs.control import Control
-from service.jobs.durable_files import NoRoom, check_room, is_full
+from service.jobs.durable_files import check_room, is_full
 from service.jobs.durable_queue import DurableQueue, HandedBack
+from service.jobs.errors import NoRoom
 from service.jobs.job import ACTIVE, KINDS, Fault, Job, State
 from service.jobs.job_folder import JobFolder, JobFolders
 from service.records.database import Database

@@ -23,7 +23,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.exc import IntegrityError
 
-from sdm_core.errors import InvalidInput
+from service.jobs.errors import NoSuchJob, OtherRequest, UnderWay
 from service.jobs.job import ACTIVE, FINISHED, Fault, Job, State
 from service.records.database import METADATA, Database
 
@@ -56,18 +56,6 @@ JOBS = Table(
     Index("rubscreen_jobs_by_age", "kind", "created_at", "id"),
     Index("rubscreen_jobs_by_state", "state"),
 )
-
-
-class NoSuchJob(InvalidInput):
-    """There is no job of this identifier."""
-
-
-class OtherRequest(InvalidInput):
-    """The idempotency key was used with another request."""
-
-
-class UnderWay(InvalidInput):
-    """The job is not over."""
 
 
 class JobRecords:

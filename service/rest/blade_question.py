@@ -16,11 +16,11 @@ from pydantic import (
 from sdm_core.blade import Blade
 from sdm_core.blade.profile import SCHEMA, BladeProfile, profile_from_dict
 from sdm_core.errors import InvalidInput
-from service.rest.limits import TooLarge, check_length
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE
 from service.rest.questions import read_question, settings_of, the_blade
 from service.settings import Settings
+from service.sizes import TooLarge, check_length
 
 
 def _profile(value: Any, info: ValidationInfo) -> BladeProfile:

@@ -9,8 +9,9 @@ import anyio
 from starlette.requests import Request
 
 from sdm_core.errors import InvalidInput
-from service.rest.limits import SlowBody, TooLarge
+from service.rest.limits import SlowBody
 from service.settings import Settings
+from service.sizes import TooLarge
 
 # A blade is six containers deep; deeper than this no question is.
 DEEPEST = 32

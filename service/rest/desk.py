@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
+from threading import Event
+from typing import Any
 
 from anyio import CapacityLimiter, to_thread
 
+from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
 from service.records.database import Database, open_database
 from service.rest.active_model import ActiveModel, Answering, WatchedModel
 from service.rest.errors import NotReady
 from service.rest.gate import Access
+from service.rest.job_desk import JobDesk
 from service.rest.limits import WorkQueue
+from service.rest.models_folder import models_folder, prepare_models
 from service.rest.self_check import self_check
 from service.settings import Settings
 from training.answers import PointAnswers
-from training.registry import SHIPPED, ModelEntry, list_models
+from training.registry import ModelEntry, list_models, load_model
 from training.served_answers import ServedAnswers
 
 
@@ -36,6 +40,10 @@ class Desk:
         Keys, jobs and audits; None without a data folder.
     access
         Who may come in, and how often.
+    jobs
+        Batches and trainings; None without a data folder.
+    closing
+        Set when the service stops: what has no end of its own ends then.
     """
 
     settings: Settings
@@ -44,6 +52,8 @@ class Desk:
     kept: ServedAnswers | None
     database: Database | None
     access: Access
+    jobs: JobDesk | None
+    closing: Event
     _checking: CapacityLimiter
 
     @classmethod
@@ -59,18 +69,25 @@ class Desk:
         folder = settings.data_folder
         database = None if folder is None else open_database(folder, settings.database_url)
         access = Access.opened(settings, database)
+        prepare_models(settings)
         kept, model = None, ActiveModel(Answering(screener)) if screener is not None else None
         if model is None:
             if settings.served_answers_folder is not None:
                 kept = ServedAnswers(settings.served_answers_folder)
             observer = None if kept is None else kept.keep
-            model = WatchedModel(_folder(settings), settings.models_poll_s, observer)
+            model = WatchedModel(models_folder(settings), settings.models_poll_s, observer)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
-        return cls(settings, model, work, kept, database, access, CapacityLimiter(1))
+        jobs = None
+        if database is not None and folder is not None:
+            jobs = JobDesk.opened(settings, database, folder, models_folder(settings))
+        return cls(settings, model, work, kept, database, access, jobs, Event(), CapacityLimiter(1))
 
     def close(self) -> None:
         """Stop what still runs, and write what is to be kept."""
+        self.closing.set()
         self.work.close()
+        if self.jobs is not None:
+            self.jobs.close()
         self.model.close()
         if self.kept is not None:
             self.kept.close()
@@ -83,7 +100,8 @@ class Desk:
         # Not the registry's own mark, which may have moved since this service started.
         answering = self.answering
         entries = [
-            replace(entry, active=entry.id == answering) for entry in list_models(_folder(self.settings))
+            replace(entry, active=entry.id == answering)
+            for entry in list_models(models_folder(self.settings))
         ]
         return sorted(entries, key=lambda entry: (not entry.active, entry.id))
 
@@ -112,6 +130,19 @@ class Desk:
             raise NotReady(now.fault.field, now.fault.value, remedy)
         return now.screener
 
+    def model_for_jobs(self, policy: str) -> str | None:
+        """The surrogate that a job accepted now is screened with; raises as `answerer`."""
+        return None if policy == "exact" else getattr(self.answerer(policy), "model_id", None)
+
+    def card(self, model_id: str | None) -> dict[str, Any] | None:
+        """The card of a model; None where there is no such model any more."""
+        if model_id is None:
+            return None
+        try:
+            return load_model(model_id, models_folder(self.settings)).card
+        except InvalidInput:
+            return None
+
     async def check(self) -> PointAnswers:
         """The service's answer to a question with a known answer.
 
@@ -127,7 +158,3 @@ class Desk:
         for policy in ("exact", "auto"):
             found = await to_thread.run_sync(self_check, answerer, policy, limiter=self._checking)
         return found
-
-
-def _folder(settings: Settings) -> Path:
-    return settings.models_folder or SHIPPED

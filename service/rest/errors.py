@@ -10,6 +10,7 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
@@ -22,10 +23,20 @@ from sdm_core.errors import (
     OutOfSpeedRange,
     TooMuchWork,
 )
+from service.jobs.errors import (
+    NoRoom,
+    NoSuchJob,
+    NoSuchUpload,
+    NotScreened,
+    OtherRequest,
+    UnderWay,
+    UploadTooLarge,
+)
 from service.rest.access import NotAllowed, NotAuthenticated
 from service.rest.job_quota import TooManyJobs
-from service.rest.limits import Busy, SlowBody, TooLarge
+from service.rest.limits import Busy, SlowBody
 from service.rest.rate_limits import TooManyRequests
+from service.sizes import TooLarge
 
 PROBLEM_JSON = "application/problem+json"
 logger = logging.getLogger("rubscreen.service")
@@ -64,6 +75,13 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (NotAllowed, Kind("not-allowed", "The caller may not do this", 403)),
     (TooManyJobs, Kind("too-many-jobs", "The caller has as many jobs as it may", 429)),
     (TooManyRequests, Kind("too-many-requests", "The caller sends more requests than it may", 429)),
+    (NoSuchJob, Kind("no-such-job", "There is no such job", 404)),
+    (NoSuchUpload, Kind("no-such-upload", "There is no such upload", 404)),
+    (NotScreened, Kind("not-screened", "There is no result of this blade", 404)),
+    (OtherRequest, Kind("other-request", "The idempotency key belongs to another request", 409)),
+    (UnderWay, Kind("under-way", "The job is not over", 409)),
+    (UploadTooLarge, Kind("too-large", "The request is too large", 413)),
+    (NoRoom, Kind("no-room", "The service has no room left on its disk", 507)),
     (TooLarge, Kind("too-large", "The request is too large", 413)),
     (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
     (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),
@@ -163,9 +181,20 @@ def _answer_stopped(request: Request, error: Exception) -> Response:
     return Problem(kind, request.scope, "service", str(error), "send the request again later")
 
 
+def _answer_database(request: Request, error: Exception) -> Response:
+    full = "full" in str(error)
+    logger.error("the database: %s", error)
+    if full:
+        kind = Kind("no-room", "The service has no room left on its disk", 507)
+        return Problem(kind, request.scope, "database", "the disk is full", "make room on it")
+    kind = Kind("database", "The database does not answer", 503, retry_after_s=10)
+    return Problem(kind, request.scope, "database", type(error).__name__, "send the request again later")
+
+
 def install(app: FastAPI) -> None:
     """Answer every exception of the table, and the framework's own, with a problem document."""
     app.add_exception_handler(InvalidInput, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     app.add_exception_handler(ClientDisconnect, _answer_gone)
     app.add_exception_handler(Cancelled, _answer_stopped)
+    app.add_exception_handler(SQLAlchemyError, _answer_database)

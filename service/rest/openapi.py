@@ -18,6 +18,7 @@ from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
 from service.rest.schemas import ProblemDocument
+from service.rest.screening_question import ScreeningQuestion
 
 Json = dict[str, Any]
 
@@ -31,14 +32,17 @@ _BULK = {
 _MEANINGS = {
     401: "No key came, or one that is not known, expired or revoked; where the service asks for keys.",
     403: "The key's role is not enough.",
+    404: "There is nothing of this identifier.",
     406: "No form of the answer is one the client accepts.",
     408: "The body did not arrive in time.",
+    409: "It does not go with what is there already; the problem says why.",
     413: "The body, an array or the number of points is over the limit.",
     415: "The body has a form that is not taken here.",
     422: "The request cannot be used; the problem names the field, its value and the remedy.",
     429: "More requests or jobs than the caller may have; Retry-After says when to come back.",
     500: "A fault of the service.",
     503: "The service cannot answer now.",
+    507: "The service has no room left on its disk.",
 }
 _KEY = (
     "`rub_<id>_<secret>`, as `rubscreen keys create` prints it. A service of one's own machine asks for none."
@@ -101,6 +105,7 @@ def _components() -> Json:
         SensitivitiesQuestion,
         MapQuestion,
         BladeQuestion,
+        ScreeningQuestion,
         ProblemDocument,
     )
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)

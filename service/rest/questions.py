@@ -22,9 +22,9 @@ from sdm_core.blade_sensitivity import check_differentiable
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
-from service.rest.limits import TooLarge, check_blade_size, check_length, check_reach
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
+from service.sizes import TooLarge, check_blade_size, check_length, check_reach
 from training.answers import POLICIES
 
 Asked = TypeVar("Asked", bound=BaseModel)
@@ -69,13 +69,15 @@ def _ke_max(value: Any) -> float:
     return number("ke_max", value, 0.0, KE_LIMIT, "N/m", open_low=True)
 
 
-def _policy(value: Any) -> str:
+def checked_policy(value: Any) -> str:
+    """Who may answer."""
     if not isinstance(value, str) or value not in POLICIES:
         raise InvalidInput("policy", value, f"give one of {', '.join(POLICIES)}")
     return value
 
 
-def _alpha(value: Any) -> float | None:
+def checked_alpha(value: Any) -> float | None:
+    """The rate that answers must keep; None leaves it to the model."""
     return None if value is None else number("alpha", value, 0.0, 1.0, "", open_low=True)
 
 
@@ -98,8 +100,8 @@ class Question(BaseModel, ABC):
     blade: Annotated[Blade, PlainValidator(the_blade), WithJsonSchema(BLADE)]
     contact: Annotated[ContactConfiguration, PlainValidator(_contact), WithJsonSchema(CONTACT)]
     speed_hz: SpeedArray
-    policy: Annotated[str, PlainValidator(_policy), WithJsonSchema(POLICY)] = "auto"
-    alpha: Annotated[float | None, PlainValidator(_alpha), WithJsonSchema(ALPHA)] = None
+    policy: Annotated[str, PlainValidator(checked_policy), WithJsonSchema(POLICY)] = "auto"
+    alpha: Annotated[float | None, PlainValidator(checked_alpha), WithJsonSchema(ALPHA)] = None
 
     @classmethod
     def read(cls, data: Any, settings: Settings) -> Self:

@@ -25,7 +25,14 @@ _TITLE = "Screening for rub-induced instability"
 TIPS_SHOWN = 4
 
 
-def html_report(batch: ScreenedBatch, *, policy: str, card: Mapping[str, Any] | None, made: datetime) -> str:
+def html_report(
+    batch: ScreenedBatch,
+    *,
+    policy: str,
+    card: Mapping[str, Any] | None,
+    made: datetime,
+    safer_left_out: int = 0,
+) -> str:
     """The whole page, pictures within it; no scripts, and nothing fetched from anywhere.
 
     Parameters
@@ -36,11 +43,14 @@ def html_report(batch: ScreenedBatch, *, policy: str, card: Mapping[str, Any] | 
         Card of the surrogate in use; None where none is known.
     made
         When the screening was made.
+    safer_left_out
+        Blades of the screening that are not in `batch`, each safer than all that are.
     """
     anchors = {id(blade): f"blade-{i}" for i, blade in enumerate(batch.blades, 1)}
     blades = safest_first(batch.report)
     body = [
         element("h1", _TITLE),
+        *([_left_out(len(blades), safer_left_out)] if safer_left_out else []),
         f"<p>{summary(batch, blades)}</p>",
         ranking(batch.report, blades, anchors),
         element("h2", "Blades side by side"),
@@ -76,6 +86,14 @@ def certificate(card: Mapping[str, Any], policy: str, used: CertificateUsed | No
             f"with {used.confidence:.0%} confidence on {used.distribution}"
         )
     return "; ".join(said) or "its card names no error rates"
+
+
+def _left_out(shown: int, left_out: int) -> str:
+    said = (
+        f"The {count(shown, 'blade')} with the smallest K_e of {shown + left_out:,} screened; the other "
+        f"{left_out:,} are safer, and in the table of results only. What follows is about those {shown}."
+    )
+    return f"<p><b>{set_ke(escape(said))}</b></p>"
 
 
 def _failures(batch: ScreenedBatch) -> str:

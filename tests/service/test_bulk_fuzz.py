@@ -19,10 +19,10 @@ from sdm_core.errors import InvalidInput
 from service.rest.forms.arrow_question import arrow_question
 from service.rest.forms.media_types import ARROW, NPZ
 from service.rest.forms.npz_question import npz_question
-from service.rest.limits import TooLarge
 from service.rest.question_schemas import POINTS_EXAMPLE
 from service.rest.questions import PointsQuestion
 from service.settings import Settings
+from service.sizes import TooLarge
 
 READERS = {NPZ: npz_question, ARROW: arrow_question}
 WHOLE = {

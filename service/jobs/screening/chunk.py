@@ -12,12 +12,13 @@ from typing import Any
 
 from sdm_core.errors import RubscreenError
 from service.jobs.screening.blade_lines import BladeLine
+from service.jobs.screening.checks import check_line
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade, UnscreenedBlade
 from service.jobs.screening.request import ScreeningRequest
-from service.rest.limits import check_reach
 from service.screening.batch import Failure
 from service.screening.screen import screen
 from service.settings import Settings
+from service.sizes import check_reach
 from training.registry import SHIPPED
 from training.screening import Screener
 
@@ -65,6 +66,7 @@ def compute_chunk(payload: bytes) -> bytes:
 def _screened(
     line: BladeLine, request: ScreeningRequest, screener: Screener, limits: Settings
 ) -> ScreenedBlade:
+    check_line(line, request, limits)
     blade = line.blade()
     ends, contacts = request.check(blade)
     for contact in contacts:

@@ -13,8 +13,9 @@ from typing import Any
 
 from sdm_core.errors import RubscreenError
 from service.jobs.control import Control
-from service.jobs.durable_files import NoRoom, check_room, is_full
+from service.jobs.durable_files import check_room, is_full
 from service.jobs.engine import Engine, EngineGone, WorkerKilled
+from service.jobs.errors import NoRoom
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.blade_lines import BladeLine, read_chunks
 from service.jobs.screening.chunk import chunk_payload, compute_chunk

@@ -12,8 +12,8 @@ from sdm_core.errors import InvalidInput
 from service.rest.body import parsed
 from service.rest.forms.bulk_question import COLUMNS, QUESTION, joined
 from service.rest.forms.flatbuffer import MESSAGE_HEADER, Table, TooMany
-from service.rest.limits import TooLarge
 from service.settings import Settings
+from service.sizes import TooLarge
 
 METADATA_KEY = f"rubscreen.{QUESTION}".encode()
 _REMEDY = "send what an Arrow stream writer writes: columns of numbers, uncompressed, closed at the end"

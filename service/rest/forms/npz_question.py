@@ -15,8 +15,8 @@ from sdm_core.blade.exchange.named_arrays.npz import npy_array
 from sdm_core.errors import DamagedFile, InvalidInput
 from service.rest.body import parsed
 from service.rest.forms.bulk_question import QUESTION, joined
-from service.rest.limits import TooLarge
 from service.settings import Settings
+from service.sizes import TooLarge
 
 _MOST_ARRAYS = 16
 _ENTRY = b"PK\x01\x02"  # starts every entry of an archive's table of contents

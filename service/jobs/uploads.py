@@ -1,0 +1,229 @@
+"""Files of blades sent ahead of a job: kept under names of our own, and never unpacked to the disk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import time
+import uuid
+import zipfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sdm_core.errors import InvalidInput
+from service.jobs.durable_files import INCOMING, check_room, remove_folder, sync_folder, write_durably
+from service.jobs.errors import DamagedUpload, NoSuchUpload, UploadTooLarge
+
+JSON, LINES, ZIP = "application/json", "application/x-ndjson", "application/zip"
+FORMS = (JSON, LINES, ZIP)
+_CONTENT, _ABOUT = "content", "about.json"
+_ID = re.compile(r"[0-9a-f]{32}")
+# A blade file of the largest size the service takes is a tenth of this.
+_LARGEST_BLADE = 32 * 2**20
+# Compressed JSON of numbers is a third to a tenth of its size; far beyond that a zip is made to do harm.
+_MOST_INFLATED = 200
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file that was sent.
+
+    Attributes
+    ----------
+    id
+        32 hexadecimal digits.
+    name
+        As its sender calls it: only ever shown.
+    form
+        One of `FORMS`.
+    owner
+        The key it came with; None without keys.
+    """
+
+    id: str
+    name: str
+    form: str
+    size_bytes: int
+    sha256: str
+    owner: str | None
+
+
+class UploadWriter:
+    """A file that is arriving."""
+
+    def __init__(self, folder: Path, upload_id: str, most_bytes: int) -> None:
+        self._folder, self._id, self._most = folder, upload_id, most_bytes
+        self._beside = folder / f"{INCOMING}{upload_id}"
+        self._beside.mkdir(parents=True)
+        self._file = (self._beside / _CONTENT).open("xb")
+        self._digest, self._size = hashlib.sha256(), 0
+
+    def write(self, part: bytes) -> None:
+        """Take a part of it.
+
+        Raises
+        ------
+        UploadTooLarge
+        OSError
+            A full disk, say.
+        """
+        self._size += len(part)
+        if self._size > self._most:
+            found = f"over {self._most} bytes"
+            raise UploadTooLarge("body", found, f"send at most {self._most} bytes: split the file")
+        self._digest.update(part)
+        self._file.write(part)
+
+    def finish(self, name: str, form: str, owner: str | None) -> Upload:
+        """All of it has come: it is on the disk when this returns.
+
+        Raises
+        ------
+        OSError
+        """
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        upload = Upload(self._id, name, form, self._size, self._digest.hexdigest(), owner)
+        write_durably(self._beside / _ABOUT, json.dumps(asdict(upload)).encode())
+        os.replace(self._beside, self._folder / self._id)
+        sync_folder(self._folder)
+        return upload
+
+    def abandon(self) -> None:
+        """Remove what has come."""
+        self._file.close()
+        remove_folder(self._beside)
+
+
+class Uploads:
+    """The files under a folder.
+
+    Parameters
+    ----------
+    most_bytes
+        Of one file.
+    reserve_bytes
+        Room to leave on the disk.
+    """
+
+    def __init__(self, folder: Path, most_bytes: int, reserve_bytes: int) -> None:
+        self._folder, self._most, self._reserve = folder, most_bytes, reserve_bytes
+
+    def begin(self, announced_bytes: int = 0) -> UploadWriter:
+        """Make ready for a file.
+
+        Raises
+        ------
+        UploadTooLarge, NoRoom
+        """
+        if announced_bytes > self._most:
+            remedy = f"send at most {self._most} bytes: split the file"
+            raise UploadTooLarge("body", f"{announced_bytes} bytes", remedy)
+        check_room(self._folder, announced_bytes, self._reserve)
+        return UploadWriter(self._folder, uuid.uuid4().hex, self._most)
+
+    def get(self, upload_id: str, owner: str | None) -> Upload:
+        """A file of this owner; None may see every one's.
+
+        Raises
+        ------
+        NoSuchUpload
+        """
+        if isinstance(upload_id, str) and _ID.fullmatch(upload_id):  # and so no path
+            try:
+                upload = Upload(**json.loads((self._folder / upload_id / _ABOUT).read_bytes()))
+            except (OSError, ValueError, TypeError):
+                upload = None
+            if upload is not None and owner in (None, upload.owner):
+                return upload
+        raise NoSuchUpload(
+            "upload", upload_id, "give the id of an upload of yours; old ones are deleted in time"
+        )
+
+    def remove(self, upload_id: str, owner: str | None) -> None:
+        """Delete a file; raises as `get`."""
+        remove_folder(self._folder / self.get(upload_id, owner).id)
+
+    def remove_older(self, age_s: float) -> int:
+        """Delete what came longer ago than `age_s`; how many files."""
+        old = [
+            path
+            for path in self._folder.iterdir()
+            if _ID.fullmatch(path.name) and time.time() - path.stat().st_mtime > age_s
+        ]
+        for path in old:
+            remove_folder(path)
+        return len(old)
+
+    def documents(self, upload: Upload, most: int) -> Iterator[tuple[str, Any]]:
+        """(source, parsed JSON) of each blade in a file, at most `most`.
+
+        Raises
+        ------
+        InvalidInput
+            Naming the place within the file that is no JSON.
+        UploadTooLarge
+            For more blades, or a zip that inflates beyond measure.
+        """
+        path = self._folder / upload.id / _CONTENT
+        read = {JSON: _of_json, LINES: _of_lines, ZIP: _of_zip}[upload.form]
+        for count, (source, document) in enumerate(read(path, upload), 1):
+            if count > most:
+                raise UploadTooLarge(upload.name, f"more than {most} blades", "split the file")
+            yield source, document
+
+
+def _of_json(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
+    found = _parsed(path.read_bytes(), upload.name)
+    if not isinstance(found, list):
+        yield upload.name, found
+        return
+    for i, document in enumerate(found):
+        yield f"{upload.name}[{i}]", document
+
+
+def _of_lines(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
+    with path.open("rb") as file:
+        for i, line in enumerate(iter(lambda: file.readline(_LARGEST_BLADE + 1), b""), 1):
+            where = f"{upload.name}:{i}"
+            if len(line) > _LARGEST_BLADE:
+                raise UploadTooLarge(where, f"over {_LARGEST_BLADE} bytes", "give one blade a line")
+            if line.strip():
+                yield where, _parsed(line, where)
+
+
+def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            wanted = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".json")]
+            if not wanted:
+                raise InvalidInput(upload.name, "no *.json in it", "put blade files or profiles into the zip")
+            inflated = sum(entry.file_size for entry in wanted)
+            if inflated > _MOST_INFLATED * max(upload.size_bytes, 1):
+                remedy = f"a zip may inflate {_MOST_INFLATED} times"
+                raise UploadTooLarge(upload.name, f"{upload.size_bytes} to {inflated} bytes", remedy)
+            for entry in wanted:
+                where = f"{upload.name}/{entry.filename}"
+                with archive.open(entry) as member:
+                    # Not what the list of contents says it is: that can lie.
+                    content = member.read(_LARGEST_BLADE + 1)
+                if len(content) > _LARGEST_BLADE:
+                    remedy = f"give at most {_LARGEST_BLADE}"
+                    raise UploadTooLarge(where, f"over {_LARGEST_BLADE} bytes", remedy)
+                yield where, _parsed(content, where)
+    except (zipfile.BadZipFile, EOFError, RuntimeError, NotImplementedError, OSError) as error:
+        remedy = f"send a whole zip without a password ({error})"
+        raise DamagedUpload(upload.name, f"{upload.size_bytes} bytes", remedy) from None
+
+
+def _parsed(content: bytes, where: str) -> Any:
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        said = str(error) or "nested too deep"
+        raise DamagedUpload(where, f"{len(content)} bytes", f"give JSON in UTF-8 ({said})") from None

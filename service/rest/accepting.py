@@ -1,0 +1,134 @@
+"""From a question to a job that is on the disk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sdm_core.errors import InvalidInput
+from sdm_core.interruption import checkpoint
+from service.jobs.durable_files import write_durably
+from service.jobs.job import SCREENING, Job
+from service.jobs.job_folder import REQUEST
+from service.jobs.jobs import Jobs
+from service.jobs.screening import blade_lines
+from service.jobs.screening.blade_lines import BladeLine
+from service.jobs.screening.checks import blades_per_chunk, check_line
+from service.jobs.screening.request import ScreeningRequest
+from service.jobs.uploads import Uploads
+from service.rest.access import Caller
+from service.rest.models_folder import models_folder
+from service.rest.screening_question import ScreeningQuestion
+from service.settings import Settings
+from service.sizes import TooLarge
+
+IDEMPOTENCY_KEY = "Idempotency-Key"
+_KEY = re.compile(r"[\x21-\x7e]{1,200}")
+
+
+def checked_idempotency_key(given: str | None) -> str | None:
+    """The header's value, where it can be one.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the header.
+    """
+    if given is None or _KEY.fullmatch(given):
+        return given
+    raise InvalidInput(IDEMPOTENCY_KEY, given, "give 1 to 200 visible ASCII characters, e.g. a UUID")
+
+
+def new_job(kind: str, caller: Caller, body: bytes, key: str | None, **more: Any) -> Job:
+    """A job of a caller, for a request of these bytes."""
+    return Job(
+        uuid.uuid4().hex,
+        kind,
+        owner=caller.key_id,
+        owner_name=None if caller.key_id is None else caller.name,
+        idempotency_key=key,
+        request_digest=hashlib.sha256(body).hexdigest(),
+        **more,
+    )
+
+
+def accept_screening(
+    ask: ScreeningQuestion,
+    job: Job,
+    jobs: Jobs,
+    uploads: Uploads,
+    settings: Settings,
+    model: str | None,
+) -> tuple[Job, bool]:
+    """Look at every blade, then hand the job in.
+
+    Parameters
+    ----------
+    model
+        The surrogate that the whole job is screened with.
+
+    Returns
+    -------
+    The job, and whether it is new.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the blade and its field, unless bad blades are to be skipped.
+    """
+    ratio = ask.speed_range_ratio
+    request = ScreeningRequest(
+        contacts=ask.contacts,
+        speed_range=ratio or ask.speed_range_hz,
+        speed_unit="Hz" if ratio is None else "ratio",
+        ke_max=ask.ke_max,
+        ke_liner=ask.ke_liner,
+        map_shape=ask.map_shape,
+        policy=ask.policy,
+        alpha=ask.alpha,
+        criteria=ask.criteria,
+        model=None if ask.policy == "exact" else model,
+        models_folder=str(models_folder(settings).resolve()),
+    )
+    lines = list(_lines(ask, request, uploads, job.owner, settings))
+    size = blades_per_chunk(request, profiles=any(line.profile for line in lines))
+    document = request.to_dict() | {"blades_per_chunk": size}
+
+    def fill(folder: Path) -> None:
+        write_durably(folder / blade_lines.FILE, blade_lines.encode(lines))
+        write_durably(folder / REQUEST, json.dumps(document, indent=1).encode())
+
+    return jobs.submit(job, fill)
+
+
+def screening_job(ask: ScreeningQuestion, caller: Caller, body: bytes, key: str | None) -> Job:
+    """The job a question asks for, not handed in yet."""
+    return new_job(SCREENING, caller, body, key, name=ask.name, priority=ask.priority)
+
+
+def _lines(
+    ask: ScreeningQuestion,
+    request: ScreeningRequest,
+    uploads: Uploads,
+    owner: str | None,
+    settings: Settings,
+) -> Iterator[BladeLine]:
+    for index, (source, document) in enumerate(ask.documents(uploads, owner, settings)):
+        checkpoint()
+        if index >= settings.max_job_blades:
+            remedy = "split the request"
+            raise TooLarge("blades", f"more than {settings.max_job_blades} blades", remedy)
+        line = BladeLine(index, source, document)
+        try:
+            check_line(line, request, settings)
+        except InvalidInput as error:
+            if ask.bad_blades == "refuse":
+                raise error.under(source) from None
+            if not isinstance(document, dict):
+                line = BladeLine(index, source, {})
+        yield line

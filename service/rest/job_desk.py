@@ -1,0 +1,73 @@
+"""The jobs of the running service: opened with it, closed with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sdm_core.errors import InvalidInput
+from service.jobs.engine import DaskEngine, Engine, Tls, checked_scheduler
+from service.jobs.job import SCREENING, TRAINING
+from service.jobs.jobs import Jobs, JobSettings, Kind
+from service.jobs.screening.checks import limits_of
+from service.jobs.screening.kind import ScreeningKind
+from service.jobs.training.kind import TrainingKind
+from service.jobs.uploads import Uploads
+from service.records.database import Database
+from service.settings import Settings
+
+SCRATCH = "scratch"
+
+
+@dataclass(frozen=True)
+class JobDesk:
+    """Jobs and the files sent ahead of them."""
+
+    jobs: Jobs
+    uploads: Uploads
+    engine: Engine
+
+    @classmethod
+    def opened(
+        cls, settings: Settings, database: Database, data_folder: Path, models_folder: Path
+    ) -> JobDesk:
+        """The jobs of the data folder.
+
+        Raises
+        ------
+        InvalidInput
+            For a scheduler's address that is none, files that are not there, or a data folder in use.
+        """
+        tls = _tls(settings)
+        address = checked_scheduler(settings.scheduler, tls)
+        engine = DaskEngine(address, settings.engine_workers, data_folder / SCRATCH, tls)
+        kinds: dict[str, Kind] = {
+            SCREENING: ScreeningKind(engine, limits_of(settings), settings.min_free_bytes),
+            TRAINING: TrainingKind(models_folder, settings.served_answers_folder, settings.min_free_bytes),
+        }
+        at_once = {SCREENING: settings.jobs_at_once, TRAINING: 1} if settings.run_jobs else {}
+        how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes)
+        jobs = Jobs(database, data_folder, kinds, how)
+        uploads = Uploads(jobs.folders.uploads, settings.max_upload_bytes, settings.min_free_bytes)
+        return cls(jobs, uploads, engine)
+
+    def close(self) -> None:
+        """Stop: what runs is handed back."""
+        self.jobs.close()
+        self.engine.close()
+
+
+def _tls(settings: Settings) -> Tls | None:
+    files = {
+        "scheduler_tls_ca": settings.scheduler_tls_ca,
+        "scheduler_tls_cert": settings.scheduler_tls_cert,
+        "scheduler_tls_key": settings.scheduler_tls_key,
+    }
+    if not any(files.values()):
+        return None
+    for name, path in files.items():
+        if path is None or not path.is_file():
+            raise InvalidInput(name, str(path or "left out"), "give the file: all three go together")
+    ca, cert, key = files.values()
+    assert ca is not None and cert is not None and key is not None
+    return Tls(ca, cert, key)

@@ -1,0 +1,80 @@
+"""``/v1/uploads``: files of blades, sent ahead of a screening."""
+
+from __future__ import annotations
+
+import anyio
+from anyio import to_thread
+from fastapi import APIRouter
+from starlette.requests import Request
+from starlette.responses import Response
+
+from service.jobs.durable_files import is_full
+from service.jobs.errors import NoRoom
+from service.jobs.uploads import FORMS
+from service.rest.access import SUBMIT, Caller, the_caller
+from service.rest.forms.media_types import body_form
+from service.rest.job_schemas import UploadReply
+from service.rest.limits import SlowBody
+from service.rest.openapi import problems
+from service.rest.routes.jobs import the_jobs
+from service.rest.routes.request import the_desk
+from service.roles import Role
+from service.sizes import check_length
+
+router = APIRouter(prefix="/v1/uploads", tags=["screenings"], dependencies=[SUBMIT])
+_UNNAMED = "upload"
+_FILE = {"schema": {"type": "string", "format": "binary"}}
+
+
+def owner_of(caller: Caller) -> str | None:
+    """Whose uploads a caller may use; None: everybody's."""
+    return None if caller.role is Role.admin else caller.key_id
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=UploadReply,
+    openapi_extra={"requestBody": {"required": True, "content": dict.fromkeys(FORMS, _FILE)}},
+    responses=problems(408, 413, 415, 422, 500, 503, 507),
+)
+async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
+    """Send blade files or profiles: one or a list as JSON, one a line (NDJSON), or *.json in a zip."""
+    desk, settings = the_jobs(request), the_desk(request).settings
+    form = body_form(request.headers.get("content-type"), FORMS)
+    check_length("name", name, settings.max_name_length, "shorten it")
+    announced = request.headers.get("content-length", "")
+    size = int(announced) if announced.isdecimal() else 0
+    writer = await to_thread.run_sync(desk.uploads.begin, size)
+    try:
+        # As much time for each part of it as a whole body has.
+        stream = request.stream()
+        while True:
+            try:
+                with anyio.fail_after(settings.body_timeout_s):
+                    part = await anext(stream, None)
+            except TimeoutError:
+                found = f"nothing for {settings.body_timeout_s:g} s"
+                raise SlowBody("body", found, "send the file without pauses") from None
+            if part is None:
+                break
+            if part:
+                await to_thread.run_sync(writer.write, part)
+        owner = the_caller(request).key_id
+        upload = await to_thread.run_sync(writer.finish, name, form, owner)
+    except BaseException as error:
+        with anyio.CancelScope(shield=True):
+            await to_thread.run_sync(writer.abandon)
+        if isinstance(error, OSError) and is_full(error):
+            raise NoRoom("data_folder", "full", "make room on the disk of the service") from None
+        raise
+    return UploadReply(
+        id=upload.id, name=upload.name, form=upload.form, size_bytes=upload.size_bytes, sha256=upload.sha256
+    )
+
+
+@router.delete("/{upload_id}", status_code=204, responses=problems(404, 500, 503))
+def delete_file(request: Request, upload_id: str) -> Response:
+    """Delete a file; screenings made of it keep what they need."""
+    the_jobs(request).uploads.remove(upload_id, owner_of(the_caller(request)))
+    return Response(status_code=204)
