@@ -14,7 +14,7 @@ from sdm_core.version import __version__
 from service.answerer import Answerer
 from service.rest import access_log, errors, gate, openapi
 from service.rest.desk import Desk
-from service.rest.routes import blades, health, models, screenings, stability, uploads
+from service.rest.routes import blades, health, models, screenings, stability, trainings, uploads
 from service.settings import Settings
 
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
@@ -68,6 +68,7 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     app.include_router(models.router)
     app.include_router(screenings.router)
     app.include_router(uploads.router)
+    app.include_router(trainings.router)
     app.include_router(health.router)
     errors.install(app)
     openapi.install(app)

@@ -9,14 +9,20 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
+from zoneinfo import ZoneInfo
 
+from croniter import croniter
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from sqlalchemy.engine import URL
 
+from sdm_core.errors import InvalidInput
+
 # Of what is in the queue, not of the code: jobs accepted by an older program run on a newer one.
 QUEUE_VERSION = "1"
-_SCHEMA, _WORKFLOW = "rubscreen_queue", "job"
+_SCHEMA, _WORKFLOW, _DUE, _SCHEDULE = "rubscreen_queue", "job", "due", "training"
 # A job killed more often than this by its process's end is given up by DBOS.
 _MOST_RECOVERIES = 10_000
 _OVER = ("SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED")
@@ -30,13 +36,33 @@ class HandedBack(BaseException):
     """
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """When something is done again.
+
+    Attributes
+    ----------
+    cron, timezone
+        Five fields, and the time zone they are in.
+    coming
+        The next time.
+    context
+        What it is done with.
+    """
+
+    cron: str
+    timezone: str
+    coming: datetime
+    context: dict[str, Any]
+
+
 class _Json(Serializer):
     """Nothing is pickled."""
 
     def serialize(self, data: Any) -> str:
         if isinstance(data, BaseException):
             data = {"error": repr(data)}
-        return json.dumps(data)
+        return json.dumps(data, default=_plain)
 
     def deserialize(self, serialized_data: str) -> Any:
         data = json.loads(serialized_data)
@@ -61,6 +87,8 @@ class DurableQueue:
         Runs the job of an identifier; raises nothing but `HandedBack`.
     at_once
         By kind, how many jobs this process runs at once; empty runs none.
+    tick
+        Called with the time (ISO 8601) and the context of a schedule when it is due, by one process.
     poll_s
         How often the queue is looked at.
     """
@@ -73,6 +101,7 @@ class DurableQueue:
         at_once: Mapping[str, int],
         *,
         kinds: tuple[str, ...],
+        tick: Callable[[str, dict[str, Any]], None],
         poll_s: float = 0.5,
     ) -> None:
         config: DBOSConfig = {
@@ -92,8 +121,12 @@ class DurableQueue:
         def job(job_id: str) -> None:
             run(job_id)
 
+        def due(at: Any, context: dict[str, Any]) -> None:
+            tick(str(at), context)
+
         DBOS(config=config)
         try:
+            self._due = DBOS.workflow(name=_DUE)(due)
             registered = DBOS.workflow(name=_WORKFLOW, max_recovery_attempts=_MOST_RECOVERIES)(job)
             DBOS.listen_queues([kind for kind in kinds if kind in at_once])
             DBOS.launch()
@@ -127,11 +160,55 @@ class DurableQueue:
             if DBOS.get_workflow_status(_run_id(job_id, attempt)) is not None:
                 DBOS.delete_workflow(_run_id(job_id, attempt))
 
+    def schedule(self, cron: str, timezone: str, context: dict[str, Any]) -> None:
+        """Be called again and again, for times missed while no process ran too; replaces the one before.
+
+        Raises
+        ------
+        InvalidInput
+            When `cron` has not five fields that mean something, or there is no such time zone.
+        """
+        if len(cron.split()) != 5 or not croniter.is_valid(cron):
+            raise InvalidInput("cron", cron, 'give five fields, e.g. "0 3 * * SUN" for Sundays at three')
+        try:
+            ZoneInfo(timezone)
+        except (ValueError, OSError, LookupError):
+            raise InvalidInput("timezone", timezone, 'give an IANA name, e.g. "Europe/Paris"') from None
+        self.unschedule()
+        DBOS.create_schedule(
+            schedule_name=_SCHEDULE,
+            workflow_fn=self._due,
+            schedule=cron,
+            context=context,
+            automatic_backfill=True,
+            cron_timezone=timezone,
+        )
+
+    def scheduled(self) -> Schedule | None:
+        """The schedule there is."""
+        found = DBOS.get_schedule(_SCHEDULE)
+        if found is None:
+            return None
+        cron, timezone = found["schedule"], found["cron_timezone"] or "UTC"
+        coming = croniter(cron, datetime.now(ZoneInfo(timezone))).get_next(datetime)
+        return Schedule(cron, timezone, coming, found["context"])
+
+    def unschedule(self) -> None:
+        """Have no schedule any more."""
+        DBOS.delete_schedule(_SCHEDULE)
+
     def close(self, hand_back: bool = True) -> None:
         """Stop taking jobs, and give back what was begun; the runs must have ended by `HandedBack`."""
         if hand_back:
             self.take_over(self._replica)
         DBOS.destroy(destroy_registry=True)
+
+
+def _plain(value: Any) -> str:
+    """Of all that is no JSON only times come here."""
+    if isinstance(value, datetime):
+        return value.isoformat()
+    raise TypeError(f"{type(value).__name__} is not kept in the queue")
 
 
 def _run_id(job_id: str, attempt: int) -> str:

@@ -21,6 +21,10 @@ class NotScreened(InvalidInput):
     """There is no result of this blade, or not yet."""
 
 
+class NotTrained(InvalidInput):
+    """The training has no model, or not yet."""
+
+
 class NoSuchUpload(InvalidInput):
     """There is no upload of this identifier."""
 

@@ -9,6 +9,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -67,6 +68,13 @@ class JobSettings:
 class Jobs:
     """The jobs of a data folder and its database.
 
+    Parameters
+    ----------
+    kinds
+        What each kind of job does.
+    tick
+        Called with this object when a schedule is due, as of `DurableQueue`.
+
     Raises
     ------
     InvalidInput
@@ -74,7 +82,12 @@ class Jobs:
     """
 
     def __init__(
-        self, database: Database, data_folder: Path, kinds: Mapping[str, Kind], settings: JobSettings
+        self,
+        database: Database,
+        data_folder: Path,
+        kinds: Mapping[str, Kind],
+        settings: JobSettings,
+        tick: Callable[[Jobs, str, dict[str, Any]], None] = lambda jobs, at, context: None,
     ) -> None:
         self.records, self.folders = JobRecords(database), JobFolders(data_folder)
         self._kinds, self.settings = kinds, settings
@@ -86,7 +99,14 @@ class Jobs:
         self._controls: dict[str, Control] = {}
         self._replicas.say(self._replica)
         try:
-            self._queue = DurableQueue(database.url, self._replica, self._run, settings.at_once, kinds=KINDS)
+            self.queue = DurableQueue(
+                database.url,
+                self._replica,
+                self._run,
+                settings.at_once,
+                kinds=KINDS,
+                tick=partial(tick, self),
+            )
         except BaseException:
             self._release()
             raise
@@ -171,7 +191,7 @@ class Jobs:
         """Forget a job that is over, and its files."""
         self.folders.remove(job.id)
         self.records.remove(job.id)
-        self._queue.forget(job.id, job.attempt)
+        self.queue.forget(job.id, job.attempt)
 
     def running(self) -> int:
         """Jobs that this process runs now."""
@@ -185,14 +205,14 @@ class Jobs:
             gone = self._running.wait_for(lambda: not self._controls, patience_s)
         if not gone:
             logger.error("jobs that did not stop: %s", ", ".join(self._controls))
-        self._queue.close(hand_back=gone)
+        self.queue.close(hand_back=gone)
         if gone:
             self._replicas.forget(self._replica)
         self._release()
 
     def _put(self, job: Job) -> None:
         try:
-            self._queue.put(job.id, job.attempt, job.kind, job.priority)
+            self.queue.put(job.id, job.attempt, job.kind, job.priority)
         except Exception as error:  # its row is there: `_tend` will put it
             logger.warning("job %s is queued later: %s", job.id, error)
 
@@ -256,7 +276,7 @@ class Jobs:
                 self._replicas.say(self._replica)
                 for silent in self._replicas.silent(self.settings.lease_s, but=self._replica):
                     logger.warning("%s says nothing any more: its jobs are taken over", silent)
-                    self._queue.take_over(silent)
+                    self.queue.take_over(silent)
                     self._replicas.forget(silent)
             except Exception as error:  # whatever it is, the next turn may do better
                 logger.warning("jobs are not tended: %s", error)
@@ -267,7 +287,7 @@ class Jobs:
     def _queue_forgotten(self) -> None:
         """Queue jobs that were accepted, but whose process ended before they were in the queue."""
         for job in self.records.unfinished():
-            over = self._queue.over(job.id, job.attempt)
+            over = self.queue.over(job.id, job.attempt)
             if over is None:
                 self._put(job)
             elif over and job.id not in self._controls and self._still(job):

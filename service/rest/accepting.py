@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import re
 import uuid
 from collections.abc import Iterator
@@ -13,13 +14,14 @@ from typing import Any
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
 from service.jobs.durable_files import write_durably
-from service.jobs.job import SCREENING, Job
+from service.jobs.job import ACTIVE, SCREENING, TRAINING, Job
 from service.jobs.job_folder import REQUEST
 from service.jobs.jobs import Jobs
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import blades_per_chunk, check_line
 from service.jobs.screening.request import ScreeningRequest
+from service.jobs.training.request import TrainingRequest
 from service.jobs.uploads import Uploads
 from service.rest.access import Caller
 from service.rest.models_folder import models_folder
@@ -28,6 +30,7 @@ from service.settings import Settings
 from service.sizes import TooLarge
 
 IDEMPOTENCY_KEY = "Idempotency-Key"
+logger = logging.getLogger("rubscreen.jobs")
 _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 
 
@@ -132,3 +135,34 @@ def _lines(
             if not isinstance(document, dict):
                 line = BladeLine(index, source, {})
         yield line
+
+
+def accept_training(request: TrainingRequest, job: Job, jobs: Jobs) -> tuple[Job, bool]:
+    """Hand a training in: the job, and whether it is new."""
+
+    def fill(folder: Path) -> None:
+        write_durably(folder / REQUEST, json.dumps(request.to_dict(), indent=1).encode())
+
+    return jobs.submit(job, fill)
+
+
+def train_when_due(jobs: Jobs, at: str, context: dict[str, Any]) -> None:
+    """Hand in the training of a schedule, unless the last one is not over."""
+    if jobs.records.page(TRAINING, states=ACTIVE, limit=1):
+        logger.warning("the training due at %s is left out: one is under way", at)
+        return
+    job = Job(
+        uuid.uuid4().hex,
+        TRAINING,
+        name=f"scheduled {at}",
+        owner=context["owner"],
+        owner_name=context["owner_name"],
+        idempotency_key=f"schedule {at}",
+    )
+    asked = context["training"]
+    accept_training(TrainingRequest.from_dict({**asked, "seed": asked["seed"] or seed_of(job)}), job, jobs)
+
+
+def seed_of(job: Job) -> int:
+    """A seed of its own for a training that was given none."""
+    return int(job.id[:8], 16) % 2**31

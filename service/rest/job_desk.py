@@ -14,6 +14,7 @@ from service.jobs.screening.kind import ScreeningKind
 from service.jobs.training.kind import TrainingKind
 from service.jobs.uploads import Uploads
 from service.records.database import Database
+from service.rest.accepting import train_when_due
 from service.settings import Settings
 
 SCRATCH = "scratch"
@@ -47,7 +48,7 @@ class JobDesk:
         }
         at_once = {SCREENING: settings.jobs_at_once, TRAINING: 1} if settings.run_jobs else {}
         how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes)
-        jobs = Jobs(database, data_folder, kinds, how)
+        jobs = Jobs(database, data_folder, kinds, how, train_when_due)
         uploads = Uploads(jobs.folders.uploads, settings.max_upload_bytes, settings.min_free_bytes)
         return cls(jobs, uploads, engine)
 

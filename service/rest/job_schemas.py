@@ -128,3 +128,26 @@ class UploadReply(BaseModel):
     form: str
     size_bytes: int
     sha256: str
+
+
+class TrainedReply(BaseModel):
+    """What came of a training."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    model: str
+    promoted: bool
+    refused: list[str] = Field(description="Why it was not promoted.")
+    seconds: dict[str, float] = Field(description="By stage; of the last run only, where it was interrupted.")
+    evaluation: dict[str, Any] = Field(description="Held-out figures by class of contact.")
+
+
+class ScheduleReply(BaseModel):
+    """When trainings are; all null where there is no schedule."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    cron: str | None
+    timezone: str | None
+    next: str | None
+    training: dict[str, Any] | None

@@ -19,6 +19,7 @@ from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
 from service.rest.schemas import ProblemDocument
 from service.rest.screening_question import ScreeningQuestion
+from service.rest.training_question import ScheduleQuestion, TrainingQuestion
 
 Json = dict[str, Any]
 
@@ -106,6 +107,8 @@ def _components() -> Json:
         MapQuestion,
         BladeQuestion,
         ScreeningQuestion,
+        TrainingQuestion,
+        ScheduleQuestion,
         ProblemDocument,
     )
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
