@@ -67,7 +67,3 @@ class ScheduleQuestion(BaseModel):
 
 TRAINING_EXAMPLE: Json = {"name": "anew", "rounds": 3}
 SCHEDULE_EXAMPLE: Json = {"cron": "0 3 * * SUN", "timezone": "Europe/Paris", "training": {"rounds": 2}}
-    "cron": "0 3 * * SUN",
-    "timezone": "Europe/Paris",
-    "training": {"with_served": True},
-}
