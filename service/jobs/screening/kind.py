@@ -82,7 +82,8 @@ class ScreeningKind:
             else:
                 left.append(number)
             control.check()
-        self._tell(control, tally, "screening")
+        control.report(total=tally.total, done=tally.done, not_screened=tally.not_screened, now=True)
+        control.report(stage="starting workers", now=True)
         self._compute(folder, asked, request, left, store, control, tally)
         control.report(stage="ranking", now=True)
         self._keep(control, partial(write_results, folder, request))
@@ -128,7 +129,7 @@ class ScreeningKind:
                     folder.note(event="stored", chunk=number)
                     tally.done += len(blades)
                     tally.not_screened += len(rows_of(content)[1])
-                    self._tell(control, tally, "screening")
+                    control.report(done=tally.done, not_screened=tally.not_screened, stage="screening")
         finally:
             for future in pending:
                 future.cancel()
@@ -194,7 +195,3 @@ class ScreeningKind:
         control.until(ready)
         if (waited := time.monotonic() - began) > 2.0:
             logger.warning("job %s waited %.0f s for the disk", control.job.id, waited)
-
-    @staticmethod
-    def _tell(control: Control, tally: _Tally, stage: str) -> None:
-        control.report(total=tally.total, done=tally.done, not_screened=tally.not_screened, stage=stage)
