@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -17,6 +18,7 @@ from zoneinfo import ZoneInfo
 from croniter import croniter
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from sqlalchemy.engine import URL
+from sqlalchemy.exc import SQLAlchemyError
 
 from sdm_core.errors import InvalidInput
 
@@ -27,6 +29,7 @@ _SCHEMA, _WORKFLOW, _DUE, _SCHEDULE = "rubscreen_queue", "job", "due", "training
 _MOST_RECOVERIES = 10_000
 _OVER = ("SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED")
 logging.getLogger("dbos").setLevel(logging.WARNING)
+logger = logging.getLogger("rubscreen.jobs")
 
 
 class HandedBack(BaseException):
@@ -118,8 +121,15 @@ class DurableQueue:
             "sys_db_pool_size": 10,
         }
 
+        self._begun: set[str] = set()
+
         def job(job_id: str) -> None:
-            run(job_id)
+            self._begun.add(mine := str(DBOS.workflow_id))
+            try:
+                run(job_id)
+            except HandedBack:
+                self._begun.discard(mine)
+                raise
 
         def due(at: Any, context: dict[str, Any]) -> None:
             tick(str(at), context)
@@ -197,11 +207,31 @@ class DurableQueue:
         """Have no schedule any more."""
         DBOS.delete_schedule(_SCHEDULE)
 
-    def close(self, hand_back: bool = True) -> None:
-        """Stop taking jobs, and give back what was begun; the runs must have ended by `HandedBack`."""
-        if hand_back:
-            self.take_over(self._replica)
-        DBOS.destroy(destroy_registry=True)
+    def close(self, hand_back: bool = True, patience_s: float = 5.0) -> None:
+        """Stop taking jobs, and give back what was begun; each run has ended, by `HandedBack` or else."""
+        try:
+            if hand_back:
+                # A run that came to its end must be known to have, before what has no end is given back:
+                # given back too, its thread would wait for an end told by others, for ever.
+                until = time.monotonic() + patience_s
+                while self.untold() and time.monotonic() < until:
+                    time.sleep(0.05)
+                self.take_over(self._replica)
+        except SQLAlchemyError as error:  # found out by the lease, then
+            logger.warning("what was begun is not given back: %s", error)
+        finally:
+            DBOS.destroy(destroy_registry=True)
+
+    def untold(self) -> set[str]:
+        """Runs of this process whose end, if they have come to it, the queue does not know yet.
+
+        Not to be called by a run: the queue would keep its asking as part of it.
+        """
+        for begun in list(self._begun):
+            status = DBOS.get_workflow_status(begun)
+            if status is None or status.status in _OVER:
+                self._begun.discard(begun)
+        return self._begun
 
 
 def _plain(value: Any) -> str:

@@ -286,6 +286,7 @@ class Jobs:
 
     def _queue_forgotten(self) -> None:
         """Queue jobs that were accepted, but whose process ended before they were in the queue."""
+        self.queue.untold()  # or its list of them would grow for ever
         for job in self.records.unfinished():
             over = self.queue.over(job.id, job.attempt)
             if over is None:
