@@ -139,6 +139,12 @@ def screener() -> RuleScreener:
 
 
 @pytest.fixture(scope="session")
+def new_screener() -> type[RuleScreener]:
+    """Makes a screener for a service of a whole module."""
+    return RuleScreener
+
+
+@pytest.fixture(scope="session")
 def shared_address() -> Iterator[str]:
     with listening(create_app(Settings(max_points=1000), screener=RuleScreener())) as url:
         yield url
