@@ -173,7 +173,7 @@ def listening(app: FastAPI, **options: Any) -> Iterator[str]:
     """The address of `app` on a real socket of the loopback."""
     options = {"log_level": "warning", "access_log": False, "timeout_graceful_shutdown": 5} | options
     server = uvicorn.Server(uvicorn.Config(app, **options))
-    with socket.socket() as sock:
+    with socket.socket(proto=socket.IPPROTO_TCP) as sock:  # as `rubscreen serve` makes it
         sock.bind(("127.0.0.1", 0))
         thread = threading.Thread(target=server.run, args=([sock],))
         thread.start()
