@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from threading import Semaphore
 from typing import Any
 
 import httpx
@@ -154,10 +155,10 @@ def test_a_key_is_refused_beyond_its_requests_in_a_minute_until_the_time_it_is_t
     key, other = _key(store), _key(store)
     statuses = []
     while 429 not in statuses:
-        answer = http.get("/v1/models", headers=key)
+        answer = http.post("/v1/stability", headers=key)
         statuses.append(answer.status_code)
         assert len(statuses) < 1000
-    assert statuses[:90] == [200] * 90
+    assert statuses[:90] == [422] * 90  # refused as a question, for its empty body
     assert http.get("/v1/models", headers=other).status_code == 200
     time.sleep(int(answer.headers["retry-after"]))
     assert http.get("/v1/models", headers=key).status_code == 200
@@ -180,7 +181,7 @@ def test_health_is_never_limited(serve, store, tmp_path):
     assert [http.get("/v1/models", headers=key).status_code for _ in range(2)] == [200, 429]
     for path in ("/healthz", "/readyz"):
         for headers in (key, {}):
-            assert [http.get(path, headers=headers).status_code for _ in range(20)] == [200] * 20
+            assert [http.get(path, headers=headers).status_code for _ in range(5)] == [200] * 5
 
 
 def test_without_keys_every_address_has_its_own_bucket(serve, problem):
@@ -205,7 +206,6 @@ def test_this_machine_is_limited_only_where_it_is_said(serve, monkeypatch):
     assert {http.get("/v1/models").status_code for _ in range(20)} == {200}
     told = [http.get("/v1/models", headers={"X-Forwarded-For": "192.0.2.7"}).status_code for _ in range(6)]
     assert told == [200] * 5 + [429]
-    assert [serve(requests_per_minute=1).get("/openapi.json").status_code for _ in range(1)] == [200]
 
 
 def test_who_tries_keys_is_stopped_before_the_database_is_asked_and_good_keys_pass(
@@ -227,18 +227,21 @@ def test_who_tries_keys_is_stopped_before_the_database_is_asked_and_good_keys_pa
 
 @pytest.mark.parametrize("own", [{}, {"max_concurrent_requests": 2}])
 def test_a_key_is_refused_beyond_its_requests_at_the_same_time(
-    serve, store, tmp_path, screener, question, problem, own
+    serve, store, tmp_path, screener, question, problem, monkeypatch, own
 ):
     limit = 2 if own else 3
     http = serve(data_folder=tmp_path / "data", auth="on", max_concurrent_requests=3, worker_threads=4)
     key, other = _key(store, **own), _key(store)
     screener.pause.clear()
+    inside, answer = Semaphore(0), screener.map
+    monkeypatch.setattr(screener, "map", lambda *asked: inside.release() or answer(*asked))
     with ThreadPoolExecutor(limit) as pool:
         try:
             waiting = [
                 pool.submit(http.post, "/v1/map", json=question("/v1/map"), headers=key) for _ in range(limit)
             ]
-            refused = _until(lambda: http.get("/v1/models", headers=key), 429)
+            assert all(inside.acquire(timeout=10.0) for _ in range(limit))
+            refused = http.get("/v1/models", headers=key)
             assert http.get("/v1/models", headers=other).status_code == 200
         finally:
             screener.pause.set()
@@ -249,12 +252,18 @@ def test_a_key_is_refused_beyond_its_requests_at_the_same_time(
     assert http.get("/v1/models", headers=key).status_code == 200
 
 
+def test_who_has_a_whole_answer_may_ask_again_at_once(serve):
+    http = serve(max_concurrent_requests=1)
+    assert {http.post("/v1/stability").status_code for _ in range(200)} == {422}
+
+
 def test_a_client_that_hung_up_takes_up_no_place(serve, screener):
     http = serve(max_concurrent_requests=1)
     where = (http.base_url.host, http.base_url.port)
     for _ in range(3):
         with socket.create_connection(where) as sock:
             sock.sendall(b"POST /v1/map HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{")
+            time.sleep(0.1)  # for it to come first: a request asked meanwhile would take its place
             _until(lambda: http.get("/v1/models"), 429)
         _until(lambda: http.get("/v1/models"), 200)
 
@@ -271,7 +280,7 @@ def _until(ask: Callable[[], httpx.Response], status: int) -> httpx.Response:
     deadline = time.monotonic() + 10.0
     while (answer := ask()).status_code != status:
         assert time.monotonic() < deadline, answer.text
-        time.sleep(0.01)
+        time.sleep(0.05)
     return answer
 
 
