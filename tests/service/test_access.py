@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -25,7 +26,16 @@ from service.app import create_app
 from service.client import Client, ServiceProblem
 from service.records.database import open_database
 from service.records.keys import KEYS, KeyStore, split_key
-from service.rest.access import ANONYMOUS, READ, NotAllowed, NotAuthenticated, guarded_routes, is_open
+from service.rest.access import (
+    ADMIN,
+    ANONYMOUS,
+    READ,
+    SUBMIT,
+    NotAllowed,
+    NotAuthenticated,
+    guarded_routes,
+    is_open,
+)
 from service.rest.errors import NotReady
 from service.rest.gate import Access
 from service.rest.key_check import KNOWN_FOR_S, KeyCheck
@@ -35,9 +45,19 @@ from service.settings import Settings
 # What is asked in a body and changes nothing.
 QUESTIONS = {"/v1/stability", "/v1/boundary", "/v1/sensitivities", "/v1/map", "/v1/blades"}
 
+
+def service(options: Settings, **parts: Any) -> FastAPI:
+    """The service, with a route of each role beside its own, so that each is tried whatever those ask for."""
+    app = create_app(options, **parts)
+    app.get("/v1/tried", dependencies=[READ])(lambda: "read")
+    app.post("/v1/tried", dependencies=[READ, SUBMIT])(lambda: "submitted")
+    app.post("/v1/models/{model}/tried", dependencies=[ADMIN, READ])(lambda model: "exchanged")
+    return app
+
+
 GUARDED = [
     (method, route.path_format, role)
-    for route, role in guarded_routes(create_app().routes)
+    for route, role in guarded_routes(service(Settings()).routes)
     for method in sorted(route.methods)
 ]
 ROUTES = pytest.mark.parametrize(("method", "path", "needs"), GUARDED, ids=lambda part: str(part))
@@ -82,7 +102,7 @@ def keyed(tmp_path_factory, serving, new_screener) -> Iterator[Keyed]:
     store = KeyStore(database)
     keys = {role: store.create(f"has {role.value}", role)[1] for role in Role}
     with (
-        serving(create_app(options, screener=new_screener())) as url,
+        serving(service(options, screener=new_screener())) as url,
         httpx.Client(base_url=url, timeout=20.0) as http,
     ):
         yield Keyed(url, http, options.data_folder, store, keys)
@@ -412,7 +432,7 @@ def test_the_documentation_of_the_service_can_use_it(host):
 
 
 def test_the_document_names_both_headers_and_every_refusal():
-    document = create_app().openapi()
+    document = service(Settings()).openapi()
     schemes = document["components"]["securitySchemes"]
     assert schemes["bearer"]["scheme"] == "bearer" and schemes["header"]["name"] == "X-API-Key"
     for method, path, needs in GUARDED:

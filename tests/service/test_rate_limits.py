@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from threading import Semaphore
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
@@ -21,6 +23,7 @@ from service.records.database import open_database
 from service.records.keys import KeyLimits, KeyStore
 from service.rest import rate_limits
 from service.rest.access import ANONYMOUS, Caller
+from service.rest.gate import Access, Gate
 from service.rest.job_quota import JobQuota, TooManyJobs
 from service.rest.rate_limits import Allowance, RateLimits, TooManyRequests
 from service.roles import Role
@@ -252,9 +255,44 @@ def test_a_key_is_refused_beyond_its_requests_at_the_same_time(
     assert http.get("/v1/models", headers=key).status_code == 200
 
 
-def test_who_has_a_whole_answer_may_ask_again_at_once(serve):
-    http = serve(max_concurrent_requests=1)
-    assert {http.post("/v1/stability").status_code for _ in range(200)} == {422}
+def test_who_has_a_whole_answer_may_ask_again_at_once():
+    access = Access.opened(Settings(max_concurrent_requests=1), None)
+    scope = {"type": "http", "path": "/v1/models", "server": None, "client": ("127.0.0.1", 1), "headers": []}
+
+    async def answer(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        for more in (True, False):
+            await send({"type": "http.response.body", "body": b"x", "more_body": more})
+
+    async def scene() -> list[bool]:
+        room = []
+
+        async def sent(message: Any) -> None:  # what a client has of the answer now
+            try:
+                _, who = await access.admit(scope)
+            except TooManyRequests:
+                room.append(False)
+            else:
+                room.append(True)
+                access.limits.leave(who)
+
+        await Gate(answer)(scope | {"state": {"desk": SimpleNamespace(access=access)}}, None, sent)
+        return room
+
+    assert asyncio.run(scene()) == [False, False, True]
+    assert not access.limits._inside
+
+
+def test_a_request_that_failed_without_an_answer_takes_up_no_place():
+    access = Access.opened(Settings(max_concurrent_requests=1), None)
+    scope = {"type": "http", "path": "/v1/models", "server": None, "client": ("127.0.0.1", 1), "headers": []}
+
+    async def fail(scope: Any, receive: Any, send: Any) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        asyncio.run(Gate(fail)(scope | {"state": {"desk": SimpleNamespace(access=access)}}, None, None))
+    assert not access.limits._inside
 
 
 def test_a_client_that_hung_up_takes_up_no_place(serve, screener):
