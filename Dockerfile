@@ -1,7 +1,11 @@
 # The screening service: one process, no privileges, nothing fetched at run time.
 #
 #   docker build --build-arg PIP_EXTRA_INDEX_URL=<index with CPU builds of torch> -t rubscreen .
-#   docker run --rm -p 8000:8000 rubscreen
+#   docker run --rm -v rubscreen:/home/rubscreen/data rubscreen rubscreen keys create "design office" --role admin
+#   docker run --rm -v rubscreen:/home/rubscreen/data -p 8000:8000 rubscreen
+#
+# The first of these prints a key; the second does not start while there is none, or with RUBSCREEN_AUTH=off
+# lets in whoever reaches the port.
 #
 # Without that index the build takes the torch of the default one, which for x86 holds several gigabytes
 # of CUDA libraries the service never uses. Settings are RUBSCREEN_... environment variables.
@@ -17,7 +21,10 @@ COPY training training
 COPY service service
 RUN pip install --no-cache-dir .
 
-RUN useradd --system --create-home --home-dir /home/rubscreen rubscreen
+# The data folder belongs to the user, so that a volume mounted there for the first time does too.
+RUN useradd --system --create-home --home-dir /home/rubscreen rubscreen \
+    && install -d -o rubscreen /home/rubscreen/data
+ENV RUBSCREEN_DATA_FOLDER=/home/rubscreen/data
 USER rubscreen
 WORKDIR /home/rubscreen
 

@@ -75,8 +75,8 @@ def create(
 @app.command(name="list")
 def list_keys(data: DataOption = None, json: JsonOption = None) -> None:
     """List the keys there are or were, with when each was last used."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     from service.commands.outputs import check_writable, console_beside, write_json
 
@@ -84,17 +84,15 @@ def list_keys(data: DataOption = None, json: JsonOption = None) -> None:
     with _store(data) as (store, where):
         keys = store.all()
     entries = [_entry(key) for key in keys]
-    table = Table(title=f"Keys in {escape(where)}", title_justify="left", title_style="bold")
+    table = Table(title=Text(f"Keys in {where}"), title_justify="left", title_style="bold")
     for heading in ("id", "name", "role", "", "created, UTC", "last used", "expires", "limits of its own"):
         table.add_column(heading, no_wrap=heading != "name")
     for key, entry in zip(keys, entries, strict=True):
         times = (_shown(at) for at in (key.created_at, key.last_used_at, key.expires_at))
         own = ", ".join(f"{name} {value}" for name, value in vars(key.limits).items() if value is not None)
-        table.add_row(key.id, escape(key.name), key.role.value, entry["state"], *times, own or "-")
+        table.add_row(key.id, Text(key.name), key.role.value, entry["state"], *times, own or "-")
     console = console_beside(json)
-    console.print(
-        table if keys else f"no keys in {where}: make one with `rubscreen keys create`", markup=False
-    )
+    console.print(table if keys else Text(f"no keys in {where}: make one with `rubscreen keys create`"))
     if json:
         write_json(json, {"keys": entries}, indent=True)
 

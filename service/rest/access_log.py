@@ -63,6 +63,7 @@ class AccessLog:
                 "ms": round((time.perf_counter() - start) * 1e3, 1),
                 "bytes": sent,
                 "client": (scope.get("client") or [None])[0],
+                "key": getattr(scope["state"].get("caller"), "key_id", None),
                 "request_id": request_id,
             }
             access.info(json.dumps(line))  # JSON keeps a line break in a path from making a second line

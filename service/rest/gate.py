@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sdm_core.errors import InvalidInput
 from service.records.database import Database
@@ -146,10 +146,24 @@ class Gate:
         except InvalidInput as error:
             await problem_of(error, scope)(scope, receive, send)
             return
+        inside = True
+
+        def leave() -> None:
+            nonlocal inside
+            if inside:
+                inside = False
+                access.limits.leave(counted_as)
+
+        async def leaving(message: Message) -> None:
+            # Before its end goes out: who has a whole answer may ask again at once.
+            if message["type"] == "http.response.body" and not message.get("more_body", False):
+                leave()
+            await send(message)
+
         try:
-            await self._app(scope, receive, send)
+            await self._app(scope, receive, leaving)
         finally:
-            access.limits.leave(counted_as)
+            leave()
 
 
 def _presented(headers: Headers) -> str | None:

@@ -139,6 +139,12 @@ def screener() -> RuleScreener:
 
 
 @pytest.fixture(scope="session")
+def new_screener() -> type[RuleScreener]:
+    """Makes a screener for a service of a whole module."""
+    return RuleScreener
+
+
+@pytest.fixture(scope="session")
 def shared_address() -> Iterator[str]:
     with listening(create_app(Settings(max_points=1000), screener=RuleScreener())) as url:
         yield url
@@ -167,7 +173,7 @@ def listening(app: FastAPI, **options: Any) -> Iterator[str]:
     """The address of `app` on a real socket of the loopback."""
     options = {"log_level": "warning", "access_log": False, "timeout_graceful_shutdown": 5} | options
     server = uvicorn.Server(uvicorn.Config(app, **options))
-    with socket.socket() as sock:
+    with socket.socket(proto=socket.IPPROTO_TCP) as sock:  # as `rubscreen serve` makes it
         sock.bind(("127.0.0.1", 0))
         thread = threading.Thread(target=server.run, args=([sock],))
         thread.start()

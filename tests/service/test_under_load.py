@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import os
@@ -17,6 +18,7 @@ from urllib.parse import urlsplit
 import httpx
 
 from service.app import create_app
+from service.commands.serve import _listening
 from service.settings import Settings
 
 
@@ -117,3 +119,23 @@ def _until_alive(client: httpx.Client) -> None:
         except httpx.TransportError:
             time.sleep(0.1)
     raise AssertionError("the service did not come up")
+
+
+def test_the_socket_of_serve_is_one_whose_answers_go_out_at_once():
+    # asyncio turns Nagle's algorithm off for sockets that name their protocol, and for no others: on those
+    # every answer on a connection that stays open took 44 ms in place of 1.
+    async def accepted_without_delay() -> int:
+        found = asyncio.get_running_loop().create_future()
+
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            sock = writer.get_extra_info("socket")
+            found.set_result(sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+            writer.close()
+
+        listening = _listening("127.0.0.1", 0)
+        async with await asyncio.start_server(answer, sock=listening):
+            _, writer = await asyncio.open_connection(*listening.getsockname())
+            writer.close()
+            return await asyncio.wait_for(found, 10.0)
+
+    assert asyncio.run(accepted_without_delay())
