@@ -14,6 +14,7 @@ from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.forms.media_types import ARROW, NPZ
+from service.rest.model_schemas import PromotionQuestion
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
@@ -63,13 +64,13 @@ def problems(*statuses: int) -> dict[int | str, Json]:
     }
 
 
-def request_body(question: type[BaseModel], example: Json, *binary: str) -> Json:
+def request_body(question: type[BaseModel], example: Json, *binary: str, required: bool = True) -> Json:
     """OpenAPI request body, for a route that parses it itself; `binary` are the other forms it takes."""
     content: Json = {"application/json": {"schema": {"$ref": _REF.format(model=question.__name__)}}}
     content["application/json"]["example"] = example
     for form in binary:
         content[form] = {"schema": {"type": "string", "format": "binary", "description": _BULK[form]}}
-    return {"requestBody": {"required": True, "content": content}}
+    return {"requestBody": {"required": required, "content": content}}
 
 
 def install(app: FastAPI) -> None:
@@ -109,6 +110,7 @@ def _components() -> Json:
         ScreeningQuestion,
         TrainingQuestion,
         ScheduleQuestion,
+        PromotionQuestion,
         ProblemDocument,
     )
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
