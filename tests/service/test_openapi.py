@@ -43,6 +43,10 @@ def test_every_path_of_the_contract_is_there(document):
         "POST /v1/map",
         "POST /v1/blades",
         "GET /v1/models",
+        "GET /v1/models/history",
+        "GET /v1/models/{model_id}",
+        "POST /v1/models/{model_id}/promote",
+        "POST /v1/models/rollback",
         "GET /healthz",
         "GET /readyz",
     }
