@@ -139,6 +139,11 @@ def screener() -> RuleScreener:
 
 
 @pytest.fixture(scope="session")
+def rule_screener() -> type[RuleScreener]:
+    return RuleScreener
+
+
+@pytest.fixture(scope="session")
 def shared_address() -> Iterator[str]:
     with listening(create_app(Settings(max_points=1000), screener=RuleScreener())) as url:
         yield url

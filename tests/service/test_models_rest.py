@@ -8,7 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 from nearby_models import nearby, with_lines
+from typer.testing import CliRunner
 
+from service import cli
 from service.app import create_app
 from service.client import Client, ServiceProblem
 from service.rest.model_schemas import ModelChange, ModelHistory
@@ -160,3 +162,25 @@ def test_the_client_promotes_and_rolls_back(http, folder, fresh_points):
             "promoted",
             "rolled back",
         ]
+
+
+def rubscreen(*arguments: str):
+    return CliRunner().invoke(cli.app, list(arguments), env={"COLUMNS": "200", "TERM": "dumb"})
+
+
+def test_the_command_line_does_over_http_what_it_does_in_a_folder(http, folder, fresh_points):
+    first, second = active_id(folder), nearby(folder, 1.001).id
+    there = ("--url", str(http.base_url))
+    fresh_points.append("it is worse by far")
+    refused = rubscreen("models", "promote", second, *there)
+    assert refused.exit_code == 1 and "it is worse by far" in refused.stderr and "--force" in refused.stderr
+    forced = rubscreen("models", "promote", second, "--force", *there)
+    assert f"{second} is active in {http.base_url}, after {first}" in forced.stdout.replace("\n", "")
+    assert rubscreen("models", "rollback", *there).exit_code == 0 and active_id(folder) == first
+    listed = json.loads(rubscreen("models", "list", "--json", "-", *there).stdout)["models"]
+    assert [entry["id"] for entry in listed if entry["active"]] == [first] and len(listed) == 2
+    told = json.loads(rubscreen("models", "history", "--json", "-", *there).stdout)
+    near = json.loads(rubscreen("models", "history", "--json", "-", "--models", str(folder)).stdout)
+    assert told == near and [change["forced"] for change in told["history"]] == [False, True, False]
+    both = rubscreen("models", "list", "--models", str(folder), *there)
+    assert both.exit_code == 2 and "leave it out with --url" in both.stderr
