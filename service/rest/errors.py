@@ -10,6 +10,7 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -187,6 +188,16 @@ def _answer_invalid(request: Request, error: Exception) -> Response:
     return problem_of(error, request.scope)
 
 
+def _answer_unreadable(request: Request, error: Exception) -> Response:
+    """A parameter of path, query or header that FastAPI itself could not read."""
+    assert isinstance(error, RequestValidationError)
+    fault = error.errors()[0]
+    missing = fault["type"] == "missing"
+    field = ".".join(str(part) for part in fault["loc"][1:]) or "request"
+    found = InvalidInput(field, "missing" if missing else fault["input"], str(fault["msg"]))
+    return problem_of(found, request.scope)
+
+
 def _answer_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     headers = error.headers or {}
@@ -226,6 +237,7 @@ def install(app: FastAPI) -> None:
     """Answer every exception of the table, and the framework's own, with a problem document."""
     app.add_exception_handler(InvalidInput, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
+    app.add_exception_handler(RequestValidationError, _answer_unreadable)
     app.add_exception_handler(ClientDisconnect, _answer_gone)
     app.add_exception_handler(Cancelled, _answer_stopped)
     app.add_exception_handler(SQLAlchemyError, _answer_database)

@@ -1,7 +1,11 @@
-"""The OpenAPI document; ``python -m service.rest.openapi`` prints what ``docs/openapi.json`` holds."""
+"""The OpenAPI document; ``python -m service.rest.openapi`` prints what ``docs/openapi.json`` holds.
+
+With ``--digest`` it prints the line that a release adds to ``docs/openapi.released.json``.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from typing import Any
@@ -10,6 +14,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from sdm_core.version import __version__
 from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
@@ -82,6 +87,7 @@ def install(app: FastAPI) -> None:
             document = generate()
             document["components"]["schemas"] |= _components()
             _guards(app, document)
+            _own_422(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 
@@ -98,6 +104,16 @@ def _guards(app: FastAPI, document: Json) -> None:
             operation["description"] = f"{operation.get('description', '')}\n\nNeeds {needed(role)}.".strip()
             refusals = {str(status): problem for status, problem in problems(401, 403, 429).items()}
             operation["responses"] = dict(sorted((refusals | operation["responses"]).items()))
+
+
+def _own_422(document: Json) -> None:
+    """FastAPI's own 422 as what the service makes of it."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            if "HTTPValidationError" in json.dumps(operation["responses"].get("422", {})):
+                operation["responses"]["422"] = problems(422)[422]
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)
 
 
 def _components() -> Json:
@@ -122,7 +138,19 @@ def _components() -> Json:
     return schemas | {"Blade": BLADE, "Contact": CONTACT, "Profile": PROFILE}
 
 
+def digest(document: Json) -> str:
+    """SHA-256 of the contract, whatever version it has.
+
+    ``docs/openapi.released.json`` holds that of every released version, and a test holds a released version
+    to it: from then on the contract only changes together with the version.
+    """
+    contract = document | {"info": {**document["info"], "version": ""}}
+    return hashlib.sha256(json.dumps(contract, sort_keys=True).encode()).hexdigest()
+
+
 if __name__ == "__main__":
     from service.app import create_app
 
-    sys.stdout.write(json.dumps(create_app().openapi(), indent=1) + "\n")
+    made = create_app().openapi()
+    released = {__version__: digest(made)}
+    sys.stdout.write(json.dumps(released if "--digest" in sys.argv else made, indent=1) + "\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 
 from fastapi import APIRouter
 from starlette.requests import Request
@@ -70,9 +71,7 @@ async def promote_model(request: Request, model_id: str, body: TheJson) -> Model
     def change() -> ModelChange:
         ask = read_question(PromotionQuestion, parsed(body) if body.strip() else {}, desk.settings)
         _check_there(desk, model_id)
-        return _changed(
-            desk, lambda: promotion.promote(model_id, models_folder(desk.settings), force=ask.force)
-        )
+        return _changed(desk, lambda folder: promotion.promote(model_id, folder, force=ask.force))
 
     return await desk.work.run(change, request)
 
@@ -81,9 +80,7 @@ async def promote_model(request: Request, model_id: str, body: TheJson) -> Model
 async def roll_back(request: Request) -> ModelChange:
     """Make the surrogate active again that was before the active one; once more, the one before that."""
     desk = the_desk(request)
-    return await desk.work.run(
-        lambda: _changed(desk, lambda: promotion.rollback(models_folder(desk.settings))), request
-    )
+    return await desk.work.run(lambda: _changed(desk, promotion.rollback), request)
 
 
 def _check_there(desk: Desk, model_id: str) -> None:
@@ -91,12 +88,13 @@ def _check_there(desk: Desk, model_id: str) -> None:
         raise NoSuchModel("model", model_id, "GET /v1/models lists those there are")
 
 
-def _changed(desk: Desk, change: Callable[[], promotion.Promotion]) -> ModelChange:
-    if models_folder(desk.settings) == SHIPPED:
-        remedy = "start the service with a models folder of its own: `rubscreen serve --models FOLDER`"
+def _changed(desk: Desk, change: Callable[[Path], promotion.Promotion]) -> ModelChange:
+    folder = models_folder(desk.settings)
+    if folder == SHIPPED:
+        remedy = "start the service with a folder of its own: `rubscreen serve --models FOLDER`"
         raise ModelNotChanged("models folder", "the one that came with the package", remedy)
     try:
-        made = change()
+        made = change(folder)
     except promotion.PromotionRefused as refused:
         raise PromotionNotAllowed(refused.model, refused.reasons) from None
     except InvalidInput as error:
