@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -111,10 +112,36 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED, *, certified
     """
     chosen = active_id(folder) if model_id is None else model_id
     place = folder / chosen
-    if not chosen.isalnum() or not place.is_dir():
+    if not is_model(chosen, folder):
         raise InvalidInput(
             "model", chosen, f"name one of {', '.join(_ids(folder)) or 'none: train one first'}"
         )
+    card, weights = _whole_files(place, certified)
+    try:
+        architecture = Architecture(**card["architecture"])
+        network = BoundaryNetwork(architecture)
+        network.load_state_dict(safetensors.torch.load(weights))
+        space = DesignSpace.from_dict(card["design_space"])
+        certificates = tuple(Certificate.from_dict(data) for data in card.get("certificates", ()))
+    except (SafetensorError, RuntimeError, TypeError, KeyError) as error:
+        raise DamagedFile("model", str(place), f"its files do not fit together ({error}); {_MEND}") from None
+    return Model(chosen, Surrogate(network, architecture), space, certificates, card)
+
+
+def is_model(model_id: str, folder: Path = SHIPPED) -> bool:
+    """Whether a folder has a model of this name, damaged or not."""
+    return model_id.isalnum() and (folder / model_id).is_dir()
+
+
+def _whole_files(place: Path, certified: bool) -> tuple[dict[str, Any], bytes]:
+    """Card and weights as they were written.
+
+    Raises
+    ------
+    DamagedFile
+        When they are not.
+    """
+    chosen = place.name
     card, text = _read_card(place, certified)
     try:
         weights = (place / _WEIGHTS).read_bytes()
@@ -132,33 +159,48 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED, *, certified
         raise DamagedFile(
             "model", str(place), f"it was trained on other features than this code has; {_MEND}"
         )
-    try:
-        architecture = Architecture(**card["architecture"])
-        network = BoundaryNetwork(architecture)
-        network.load_state_dict(safetensors.torch.load(weights))
-        space = DesignSpace.from_dict(card["design_space"])
-        certificates = tuple(Certificate.from_dict(data) for data in card.get("certificates", ()))
-    except (SafetensorError, RuntimeError, TypeError, KeyError) as error:
-        raise DamagedFile("model", str(place), f"its files do not fit together ({error}); {_MEND}") from None
-    return Model(chosen, Surrogate(network, architecture), space, certificates, card)
+    return card, weights
 
 
 _MEND = "restore it from the distribution, train again with `rubscreen train`, or activate another model"
 
 
 def list_models(folder: Path = SHIPPED) -> list[ModelEntry]:
-    """Every model of a folder, the active one first."""
+    """Every model of a folder, the active one first; no network is built, and whole files are read once."""
     try:
         active = active_id(folder)
     except InvalidInput:
         active = ""
-    entries = []
-    for name in _ids(folder):
-        try:
-            entries.append(ModelEntry(name, name == active, load_model(name, folder).card))
-        except DamagedFile as error:
-            entries.append(ModelEntry(name, name == active, {}, f"{error.value}: {error.remedy}"))
+    entries = [model_entry(name, folder, active) for name in _ids(folder)]
     return sorted(entries, key=lambda e: (not e.active, e.id))
+
+
+def model_entry(model_id: str, folder: Path, active: str | None) -> ModelEntry:
+    """The line of the model list about one model.
+
+    Its checksums are taken when it is first seen and again when a file of it has been written since.
+    """
+    place = folder / model_id
+    try:
+        card = json.loads(_card_of_whole_files(place, _stamp(place / _CARD), _stamp(place / _WEIGHTS)))
+    except DamagedFile as error:
+        return ModelEntry(model_id, model_id == active, {}, f"{error.value}: {error.remedy}")
+    return ModelEntry(model_id, model_id == active, card)
+
+
+@lru_cache(maxsize=256)
+def _card_of_whole_files(place: Path, *stamps: tuple[int, int, int] | None) -> str:
+    # As text: a caller may change what it is given.
+    return json.dumps(_whole_files(place, certified=True)[0])
+
+
+def _stamp(file: Path) -> tuple[int, int, int] | None:
+    """Changes whenever the file is written."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _write_files(target: Path, files: dict[str, bytes]) -> None:

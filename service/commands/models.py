@@ -31,19 +31,39 @@ def run(
     json: JsonOption = None,
 ) -> None:
     """List the surrogates of a folder, or of a running service, the active one marked."""
-    if context.invoked_subcommand is not None:
-        return
+    if context.invoked_subcommand is None:
+        _list(models, url, history, json)
+
+
+@app.command("list")
+def list_them(models: ModelsOption = None, url: UrlOption = None, json: JsonOption = None) -> None:
+    """List the surrogates of a folder, or of a running service, the active one marked."""
+    _list(models, url, False, json)
+
+
+@app.command("history")
+def show_history(models: ModelsOption = None, url: UrlOption = None, json: JsonOption = None) -> None:
+    """Show which surrogate was active when, and what spoke against those that were forced."""
+    from dataclasses import asdict
+
+    from service.commands.outputs import check_writable, console_beside, write_json
+
+    check_writable(json=json)
+    changes = _history_of(models, url)
+    console_beside(json).print(_history_table(changes) if changes else "no change of the model is on record")
+    if json:
+        write_json(json, {"history": [asdict(change) for change in changes]}, indent=True)
+
+
+def _list(models: str | None, url: str | None, history: bool, json: str | None) -> None:
     from dataclasses import asdict
 
     from rich.table import Table
 
-    from sdm_core.errors import InvalidInput
     from service.commands.outputs import check_writable, console_beside, write_json
-    from training.activation import history as history_of
 
     check_writable(json=json)
-    if history and url:
-        raise InvalidInput("--history", "with --url", "give --models: a service does not tell its history")
+    _check_one_place(models, url)
     entries = _of_service(url) if url else _of_folder(models)
     console = console_beside(json)
     table = Table(title="Models", title_justify="left", title_style="bold")
@@ -55,7 +75,7 @@ def run(
     for entry in entries:
         if entry.get("damage"):
             console.print(f"{entry['id']} is damaged: {entry['damage']}", markup=False)
-    changes = history_of(_folder(models)) if history else ()
+    changes = _history_of(models, url) if history else ()
     if history:
         console.print(_history_table(changes))
     if json:
@@ -67,6 +87,7 @@ def run(
 def promote(
     model: Annotated[str, typer.Argument(metavar="ID", help="The model to become active.")],
     models: ModelsOption = None,
+    url: UrlOption = None,
     force: Annotated[bool, typer.Option("--force", help="Promote it though it is worse.")] = False,
 ) -> None:
     """Make a surrogate the active one, unless its certificate or its figures are worse than the active one's.
@@ -77,13 +98,14 @@ def promote(
     """
     from rich.console import Console
 
+    from service.commands.model_places import place_of
     from training.promotion import PromotionRefused
-    from training.promotion import promote as promoted
 
-    folder = _folder(models)
+    _check_one_place(models, url)
+    place = place_of(url, None if url else _folder(models))
     try:
         with Console(stderr=True).status("measuring it on fresh points"):
-            made = promoted(model, folder, force=force)
+            made = place.promote(model, force=force)
     except PromotionRefused as refused:
         typer.echo(f"rubscreen: {model} is not promoted:", err=True)
         for reason in refused.reasons:
@@ -95,17 +117,18 @@ def promote(
         return
     for reason in made.overridden:
         typer.echo(f"forced, although {reason}")
-    typer.echo(f"{made.model} is active in {folder}, after {made.was or 'none'}")
+    typer.echo(f"{made.model} is active in {place.name}, after {made.was or 'none'}")
 
 
 @app.command()
-def rollback(models: ModelsOption = None) -> None:
+def rollback(models: ModelsOption = None, url: UrlOption = None) -> None:
     """Make the surrogate active again that was before the active one; once more, the one before that."""
-    from training.promotion import rollback as rolled_back
+    from service.commands.model_places import place_of
 
-    folder = _folder(models)
-    made = rolled_back(folder)
-    typer.echo(f"{made.model} is active again in {folder}, instead of {made.was}")
+    _check_one_place(models, url)
+    place = place_of(url, None if url else _folder(models))
+    made = place.rollback()
+    typer.echo(f"{made.model} is active again in {place.name}, instead of {made.was}")
 
 
 @app.command()
@@ -221,6 +244,20 @@ def _of_folder(models: str | None) -> list[dict[str, Any]]:
         {"id": entry.id, "active": entry.active, "card": entry.card, "damage": entry.damage}
         for entry in found
     ]
+
+
+def _history_of(models: str | None, url: str | None) -> tuple[Activation, ...]:
+    from service.commands.model_places import place_of
+
+    _check_one_place(models, url)
+    return place_of(url, None if url else _folder(models)).history()
+
+
+def _check_one_place(models: str | None, url: str | None) -> None:
+    from sdm_core.errors import InvalidInput
+
+    if models is not None and url is not None:
+        raise InvalidInput("--models", models, "leave it out with --url: the service has its own")
 
 
 def _history_table(changes: tuple[Activation, ...]) -> Table:

@@ -61,6 +61,9 @@ class ActiveModel:
     def close(self) -> None:
         """Nothing is watched here."""
 
+    def follow(self) -> None:
+        """Nor followed."""
+
 
 class WatchedModel(ActiveModel):
     """The active model of a folder, followed by a thread.
@@ -87,6 +90,7 @@ class WatchedModel(ActiveModel):
             now = Answering(Screener(None, on_exact=on_exact), error)
         super().__init__(now)
         self._closing = threading.Event()
+        self._following = threading.Lock()
         self._thread = None
         if poll_s > 0:
             self._thread = threading.Thread(
@@ -102,6 +106,10 @@ class WatchedModel(ActiveModel):
 
     def follow(self) -> None:
         """Look at the pointer now, and load what it names where that is new."""
+        with self._following:  # the thread, and who has just moved the pointer
+            self._follow()
+
+    def _follow(self) -> None:
         stamp = _stamp(self._folder)
         if stamp == self._seen:
             return

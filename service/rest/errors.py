@@ -10,6 +10,7 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -55,6 +56,30 @@ class UnsupportedForm(InvalidInput):
     """The body has a form that is not taken here."""
 
 
+class NoSuchModel(InvalidInput):
+    """There is no model of this name."""
+
+
+class ModelNotChanged(InvalidInput):
+    """Another model cannot become the active one as things are."""
+
+
+class PromotionNotAllowed(ModelNotChanged):
+    """The gate refused a promotion.
+
+    Attributes
+    ----------
+    members
+        Of the problem document, beside its usual ones.
+    """
+
+    def __init__(self, model: str, reasons: tuple[str, ...]) -> None:
+        why = "; ".join(reasons)
+        remedy = f'it is worse than the active one ({why}); {{"force": true}} promotes it all the same'
+        super().__init__("model", model, remedy)
+        self.members = {"reasons": list(reasons)}
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of problem: the last part of its `type`, its title and its HTTP status."""
@@ -92,6 +117,9 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (DamagedFile, Kind("damaged-file", "A file of the service is damaged", 503)),
     (NotAcceptable, Kind("not-acceptable", "No such form of the answer", 406)),
     (UnsupportedForm, Kind("unsupported-media-type", "No such form of the body is taken", 415)),
+    (NoSuchModel, Kind("no-such-model", "There is no such model", 404)),
+    (PromotionNotAllowed, Kind("promotion-refused", "The model is worse than the active one", 409)),
+    (ModelNotChanged, Kind("model-not-changed", "The active model cannot be changed so", 409)),
     (OutOfSpeedRange, Kind("out-of-speed-range", "The modal data do not reach this speed", 422)),
     (ModesNotTracked, Kind("modes-not-tracked", "Modes cannot be followed between the states", 422)),
     (InvalidInput, Kind("invalid-input", "The request cannot be used", 422)),
@@ -120,6 +148,7 @@ class Problem(Response):
         value: str,
         remedy: str,
         headers: Mapping[str, str] | None = None,
+        members: Mapping[str, Any] | None = None,
     ) -> None:
         document = {
             "type": kind.type,
@@ -131,6 +160,7 @@ class Problem(Response):
             "value": value,
             "remedy": remedy,
             "request_id": scope.get("state", {}).get("request_id"),
+            **(members or {}),
         }
         extra = dict(headers or {})
         if kind.retry_after_s is not None:
@@ -148,14 +178,24 @@ def unexpected(scope: Mapping[str, Any], error: Exception) -> Problem:
 
 
 def problem_of(error: InvalidInput, scope: Mapping[str, Any]) -> Problem:
-    """The problem document that says what is wrong, with the headers that go with it."""
-    headers = getattr(error, "headers", None)
-    return Problem(kind_of(error), scope, error.field, error.value, error.remedy, headers)
+    """The problem document that says what is wrong, with the headers and members that go with it."""
+    headers, members = getattr(error, "headers", None), getattr(error, "members", None)
+    return Problem(kind_of(error), scope, error.field, error.value, error.remedy, headers, members)
 
 
 def _answer_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
     return problem_of(error, request.scope)
+
+
+def _answer_unreadable(request: Request, error: Exception) -> Response:
+    """A parameter of path, query or header that FastAPI itself could not read."""
+    assert isinstance(error, RequestValidationError)
+    fault = error.errors()[0]
+    missing = fault["type"] == "missing"
+    field = ".".join(str(part) for part in fault["loc"][1:]) or "request"
+    found = InvalidInput(field, "missing" if missing else fault["input"], str(fault["msg"]))
+    return problem_of(found, request.scope)
 
 
 def _answer_http(request: Request, error: Exception) -> Response:
@@ -197,6 +237,7 @@ def install(app: FastAPI) -> None:
     """Answer every exception of the table, and the framework's own, with a problem document."""
     app.add_exception_handler(InvalidInput, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
+    app.add_exception_handler(RequestValidationError, _answer_unreadable)
     app.add_exception_handler(ClientDisconnect, _answer_gone)
     app.add_exception_handler(Cancelled, _answer_stopped)
     app.add_exception_handler(SQLAlchemyError, _answer_database)

@@ -1,7 +1,11 @@
-"""The OpenAPI document; ``python -m service.rest.openapi`` prints what ``docs/openapi.json`` holds."""
+"""The OpenAPI document; ``python -m service.rest.openapi`` prints what ``docs/openapi.json`` holds.
+
+With ``--digest`` it prints the line that a release adds to ``docs/openapi.released.json``.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from typing import Any
@@ -10,10 +14,12 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from sdm_core.version import __version__
 from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.forms.media_types import ARROW, NPZ
+from service.rest.model_schemas import PromotionQuestion
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
@@ -63,13 +69,13 @@ def problems(*statuses: int) -> dict[int | str, Json]:
     }
 
 
-def request_body(question: type[BaseModel], example: Json, *binary: str) -> Json:
+def request_body(question: type[BaseModel], example: Json, *binary: str, required: bool = True) -> Json:
     """OpenAPI request body, for a route that parses it itself; `binary` are the other forms it takes."""
     content: Json = {"application/json": {"schema": {"$ref": _REF.format(model=question.__name__)}}}
     content["application/json"]["example"] = example
     for form in binary:
         content[form] = {"schema": {"type": "string", "format": "binary", "description": _BULK[form]}}
-    return {"requestBody": {"required": True, "content": content}}
+    return {"requestBody": {"required": required, "content": content}}
 
 
 def install(app: FastAPI) -> None:
@@ -81,6 +87,7 @@ def install(app: FastAPI) -> None:
             document = generate()
             document["components"]["schemas"] |= _components()
             _guards(app, document)
+            _own_422(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 
@@ -99,6 +106,16 @@ def _guards(app: FastAPI, document: Json) -> None:
             operation["responses"] = dict(sorted((refusals | operation["responses"]).items()))
 
 
+def _own_422(document: Json) -> None:
+    """FastAPI's own 422 as what the service makes of it."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            if "HTTPValidationError" in json.dumps(operation["responses"].get("422", {})):
+                operation["responses"]["422"] = problems(422)[422]
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)
+
+
 def _components() -> Json:
     described = (
         PointsQuestion,
@@ -109,6 +126,7 @@ def _components() -> Json:
         ScreeningQuestion,
         TrainingQuestion,
         ScheduleQuestion,
+        PromotionQuestion,
         ProblemDocument,
     )
     _, found = models_json_schema([(model, "validation") for model in described], ref_template=_REF)
@@ -120,7 +138,19 @@ def _components() -> Json:
     return schemas | {"Blade": BLADE, "Contact": CONTACT, "Profile": PROFILE}
 
 
+def digest(document: Json) -> str:
+    """SHA-256 of the contract, whatever version it has.
+
+    ``docs/openapi.released.json`` holds that of every released version, and a test holds a released version
+    to it: from then on the contract only changes together with the version.
+    """
+    contract = document | {"info": {**document["info"], "version": ""}}
+    return hashlib.sha256(json.dumps(contract, sort_keys=True).encode()).hexdigest()
+
+
 if __name__ == "__main__":
     from service.app import create_app
 
-    sys.stdout.write(json.dumps(create_app().openapi(), indent=1) + "\n")
+    made = create_app().openapi()
+    released = {__version__: digest(made)}
+    sys.stdout.write(json.dumps(released if "--digest" in sys.argv else made, indent=1) + "\n")

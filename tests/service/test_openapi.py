@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 
+from sdm_core.version import __version__
 from service.app import create_app
+from service.rest import openapi
 
 COMMITTED = Path(__file__).parents[2] / "docs" / "openapi.json"
+RELEASED = COMMITTED.with_name("openapi.released.json")
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +30,22 @@ def test_the_committed_document_is_the_services_own(document):
     )
 
 
+def test_a_released_version_keeps_its_contract(document):
+    released = json.loads(RELEASED.read_text(encoding="utf-8"))
+    if __version__ in released:
+        assert openapi.digest(document) == released[__version__], (
+            f"{__version__} is released and the wire contract changed: raise sdm_core/version.py"
+        )
+
+
+def test_the_digest_of_a_contract_hangs_on_the_contract_and_not_on_its_version(document):
+    other = json.loads(json.dumps(document))
+    other["info"]["version"] = "99.0.0"
+    assert openapi.digest(other) == openapi.digest(document)
+    other["paths"]["/v1/map"]["post"]["responses"].pop("406")
+    assert openapi.digest(other) != openapi.digest(document)
+
+
 def test_every_reference_leads_somewhere(document):
     for reference in re.findall(r'"\$ref": "#/([^"]+)"', json.dumps(document)):
         target = document
@@ -37,14 +56,40 @@ def test_every_reference_leads_somewhere(document):
 def test_every_path_of_the_contract_is_there(document):
     paths = {f"{method.upper()} {path}" for path, item in document["paths"].items() for method in item}
     assert paths == {
-        "POST /v1/stability",
-        "POST /v1/boundary",
-        "POST /v1/sensitivities",
-        "POST /v1/map",
-        "POST /v1/blades",
-        "GET /v1/models",
         "GET /healthz",
         "GET /readyz",
+        "POST /v1/blades",
+        "POST /v1/boundary",
+        "POST /v1/map",
+        "GET /v1/models",
+        "GET /v1/models/history",
+        "POST /v1/models/rollback",
+        "GET /v1/models/{model_id}",
+        "POST /v1/models/{model_id}/promote",
+        "GET /v1/screenings",
+        "POST /v1/screenings",
+        "DELETE /v1/screenings/{job_id}",
+        "GET /v1/screenings/{job_id}",
+        "GET /v1/screenings/{job_id}/blades/{index}/boundaries.png",
+        "GET /v1/screenings/{job_id}/blades/{index}/map.png",
+        "GET /v1/screenings/{job_id}/events",
+        "GET /v1/screenings/{job_id}/report",
+        "GET /v1/screenings/{job_id}/results",
+        "POST /v1/screenings/{job_id}/retry",
+        "POST /v1/sensitivities",
+        "POST /v1/stability",
+        "GET /v1/trainings",
+        "POST /v1/trainings",
+        "DELETE /v1/trainings/schedule",
+        "GET /v1/trainings/schedule",
+        "PUT /v1/trainings/schedule",
+        "DELETE /v1/trainings/{job_id}",
+        "GET /v1/trainings/{job_id}",
+        "GET /v1/trainings/{job_id}/events",
+        "GET /v1/trainings/{job_id}/result",
+        "POST /v1/trainings/{job_id}/retry",
+        "POST /v1/uploads",
+        "DELETE /v1/uploads/{upload_id}",
     }
 
 

@@ -53,7 +53,7 @@ router = APIRouter(prefix="/v1/screenings", tags=["screenings"])
     status_code=202,
     response_model=JobReply,
     openapi_extra=request_body(ScreeningQuestion, SCREENING_EXAMPLE),
-    responses=problems(408, 409, 413, 415, 422, 500, 503, 507),
+    responses=problems(404, 408, 409, 413, 415, 422, 500, 503, 507),
     dependencies=[SUBMIT],
 )
 async def screen_a_batch(

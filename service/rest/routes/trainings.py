@@ -18,7 +18,6 @@ from service.rest import replies
 from service.rest.accepting import accept_training, checked_idempotency_key, new_job, seed_of
 from service.rest.access import ADMIN, READ, the_caller
 from service.rest.body import parsed
-from service.rest.errors import NotReady
 from service.rest.forms.media_types import JSON
 from service.rest.job_schemas import JobReply, JobsReply, ScheduleReply, TrainedReply
 from service.rest.openapi import problems, request_body
@@ -165,7 +164,7 @@ def training_events(request: Request, job_id: str) -> StreamingResponse:
 
 def _check_served(request: Request, ask: TrainingQuestion) -> None:
     if ask.with_served and the_desk(request).settings.served_answers_folder is None:
-        raise NotReady("with_served", "true", "start the service with --keep-answers FOLDER")
+        raise InvalidInput("with_served", "true", "start the service with --keep-answers FOLDER")
 
 
 def _schedule(request: Request) -> Response:
