@@ -45,6 +45,7 @@ def test_every_path_of_the_contract_is_there(document):
         "GET /v1/models",
         "GET /healthz",
         "GET /readyz",
+        "GET /metrics",
     }
 
 
