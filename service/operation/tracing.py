@@ -11,6 +11,7 @@ from sdm_core.version import __version__
 
 SERVICE_NAME = "rubscreen"
 REQUEST_ID = "rubscreen.request_id"
+_PATIENCE_S = 2.0
 # Probes and scrapes come by the thousand and tell a trace nothing.
 _UNTRACED = frozenset({"/healthz", "/readyz", "/metrics"})
 
@@ -50,7 +51,9 @@ class Tracing:
         resource = Resource.create({"service.name": SERVICE_NAME, "service.version": __version__})
         # Not the global provider: two applications in a process may go to two collectors.
         self._provider = TracerProvider(resource=resource, shutdown_on_exit=False)
-        self._provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter(endpoint=whole)))
+        # A collector that is away must not keep the service from stopping.
+        exporter = OTLPSpanExporter(endpoint=whole, timeout=_PATIENCE_S)
+        self._provider.add_span_processor(BatchSpanProcessor(exporter))
         self._trace = trace
 
     def for_fastapi(self) -> dict[str, Any]:

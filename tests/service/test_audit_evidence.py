@@ -6,41 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from benchmarks.audit import answers_until_alarm
+from service.audit.tally import FALSE_ALARM
 from training.audit_evidence import log_evidence
 from training.certificate import LADDER
 
-DELTA = 0.01
-NEVER = 10**9
-
-
-def answers_until_alarm(rate: float, alpha: float, paths: int, horizon: int, seed: int) -> np.ndarray:
-    """Audited answers until the evidence first reaches 1/δ, one a path; `NEVER` within the horizon.
-
-    Between two errors evidence only falls, so it is enough to look at it when one is made.
-    """
-    rng = np.random.default_rng(seed)
-    errors = int(binom.isf(1e-9, horizon, rate)) + 2
-    at = np.cumsum(rng.geometric(rate, (paths, errors)), axis=1)
-    assert (at[:, -1] > horizon).all()
-    needed = np.array([fewest_errors_too_many(k, alpha, horizon) for k in range(1, errors + 1)])
-    alarmed = (at <= horizon) & (at <= needed)
-    first = np.argmax(alarmed, axis=1)
-    return np.where(alarmed.any(axis=1), at[np.arange(paths), first], NEVER)
-
-
-def fewest_errors_too_many(errors: int, alpha: float, horizon: int) -> int:
-    """The largest number of answers among which so many errors raise the alarm; 0 where none does."""
-    low, high = 0, horizon + 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        alarm = middle >= errors and log_evidence(errors, middle, alpha) >= np.log(1 / DELTA)
-        low, high = (middle, high) if alarm or middle < errors else (low, middle)
-    return low if low >= errors and log_evidence(errors, low, alpha) >= np.log(1 / DELTA) else 0
+DELTA = FALSE_ALARM
 
 
 @pytest.mark.parametrize("alpha", LADDER)
 def test_a_rate_that_is_just_kept_raises_a_false_alarm_in_fewer_than_one_path_of_a_hundred(alpha):
-    alarms = np.sum(answers_until_alarm(alpha, alpha, 4_000, 100_000, seed=3) < NEVER)
+    alarms = np.sum(answers_until_alarm(alpha, alpha, 4_000, 100_000, seed=3) < np.inf)
     assert alarms / 4_000 < DELTA
     # That many, or more, would still be seen once in a thousand times if the promise were just kept.
     assert alarms <= binom.isf(1e-3, 4_000, DELTA)
@@ -56,7 +32,7 @@ def test_a_broken_rate_is_found_about_as_soon_as_a_test_of_that_one_rate_would(t
 
 
 def test_a_rate_below_the_bound_raises_none():
-    assert (answers_until_alarm(0.2 * 5e-4, 5e-4, 2_000, 100_000, seed=5) == NEVER).mean() > 0.999
+    assert (answers_until_alarm(0.2 * 5e-4, 5e-4, 2_000, 100_000, seed=5) == np.inf).mean() > 0.999
 
 
 @pytest.mark.parametrize("alpha", LADDER)
