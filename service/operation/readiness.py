@@ -90,8 +90,8 @@ class DatabaseCheck:
 def disk_check(folder: Path, reserve_bytes: int) -> Check:
     """Whether there is room left for the database to be written.
 
-    Jobs wait by themselves while less than `reserve_bytes` is free, and questions are answered meanwhile. With
-    only a quarter of that left it is not they who fill the disk, and the database is next.
+    Jobs wait by themselves while less than `reserve_bytes` is free, and questions are answered meanwhile.
+    With only a quarter of that left it is not they who fill the disk, and the database is next.
     """
     least_bytes = reserve_bytes // 4
     try:
