@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from sdm_core.boundary import verdicts
 from sdm_core.errors import Cancelled
 from sdm_core.interruption import interruptible
 from service.audit.tally import Promise, Tally
+from service.operation.logs import bound, carried
 from service.records import audits
 from service.records.audits import Audited
 from service.records.database import Database
@@ -67,7 +69,7 @@ class Auditor:
         self._share, self._points, self._on_mistake = share_of_time, points_per_answer, on_mistake
         self._database = database
         self._rng, self._lock = np.random.default_rng(), threading.Lock()
-        self._waiting: list[ConfidentAnswers] = []
+        self._waiting: list[tuple[ConfidentAnswers, dict[str, Any]]] = []
         self._there, self._closing = threading.Event(), threading.Event()
         self.counted: dict[Promise, Tally] = {}
         self.passed_over = 0
@@ -98,12 +100,13 @@ class Auditor:
             sample = answers.drawn(self._points, self._rng)
             if not len(sample):
                 return
+            drawn = sample, carried()
             if len(self._waiting) >= MOST_WAITING:
                 place = int(self._rng.integers(MOST_WAITING))
-                self.passed_over += len(self._waiting[place])
-                self._waiting[place] = sample
+                self.passed_over += len(self._waiting[place][0])
+                self._waiting[place] = drawn
             else:
-                self._waiting.append(sample)
+                self._waiting.append(drawn)
         self._there.set()
 
     def close(self) -> None:
@@ -117,17 +120,18 @@ class Auditor:
         while not self._closing.is_set():
             # Counts of other replicas are read even where nothing is asked of this one.
             self._there.wait(WRITE_EVERY_S if self._unwritten else 30 * WRITE_EVERY_S)
-            sample = self._next()
-            if sample is not None:
+            drawn = self._next()
+            if drawn is not None:
                 began = time.monotonic()
-                self._audit(sample)
+                with bound(**drawn[1]):
+                    self._audit(drawn[0])
                 self._rest(time.monotonic() - began)
-            if sample is None or time.monotonic() - written > WRITE_EVERY_S:
+            if drawn is None or time.monotonic() - written > WRITE_EVERY_S:
                 self._write()
                 written = time.monotonic()
         self._write()
 
-    def _next(self) -> ConfidentAnswers | None:
+    def _next(self) -> tuple[ConfidentAnswers, dict[str, Any]] | None:
         with self._lock:
             if not self._waiting:
                 self._there.clear()

@@ -72,6 +72,11 @@ def bound(**fields: Any) -> Any:
     return structlog.contextvars.bound_contextvars(**fields)
 
 
+def carried() -> dict[str, Any]:
+    """What lines logged here carry, for work done later and elsewhere on behalf of the same request."""
+    return structlog.contextvars.get_contextvars()
+
+
 def _handler(form: LogFormat, stream: TextIO) -> logging.Handler:
     handler = logging.StreamHandler(stream)
     as_text = form == "text" or (form == "auto" and stream.isatty())

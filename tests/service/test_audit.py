@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import threading
 import time
@@ -21,6 +22,7 @@ from service.app import create_app
 from service.audit import auditor as auditing
 from service.audit.auditor import MOST_WAITING, Auditor
 from service.audit.tally import Promise, Tally
+from service.operation.logs import _handler, bound
 from service.records import audits
 from service.records.database import Database, database_url
 from service.settings import Settings
@@ -146,18 +148,24 @@ def database(tmp_path):
     opened.close()
 
 
-def test_what_is_found_is_counted_by_what_was_answered_and_what_is_true(database):
+def test_what_is_found_is_counted_by_what_was_answered_and_what_is_true(database, monkeypatch):
     low, high = sample(ke=2e3), sample(ke=4e4)
     assert low.stable.all() and not high.stable.any()
     mistakes: list[ExactAnswers] = []
+    lines = io.StringIO()
+    monkeypatch.setattr(auditing.logger, "handlers", [_handler("json", lines)])
     auditor = Auditor(1.0, 100, database, mistakes.append)
-    for answers in (low, high, sample(5, 2e3, wrong=True), sample(3, 4e4, wrong=True)):
+    for answers in (low, high, sample(5, 2e3, wrong=True)):
         auditor.draw(answers)
+    with bound(request_id="r7"):
+        auditor.draw(sample(3, 4e4, wrong=True))
     until(lambda: auditor.counted.get(PROMISE, Tally()).audited == 24, "not all were audited")
     auditor.close()
     counted = Tally(answered_stable=11, false_stable=3, answered_unstable=13, false_unstable=5)
     assert auditor.counted == {PROMISE: counted}
     assert audits.read(database)[PROMISE].tally == counted
+    # What was found is logged for the request that it was answered in.
+    assert lines.getvalue().count('"request_id": "r7"') == 3
     # The surrogate can learn from these more than from any others.
     assert sorted(len(answers) for answers in mistakes) == [3, 5]
 
