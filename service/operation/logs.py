@@ -15,8 +15,8 @@ from structlog.typing import EventDict, Processor, WrappedLogger
 LogFormat = Literal["auto", "json", "text"]
 
 # Loggers of the service and of the libraries it runs on. Some of the latter bring handlers of their own.
-OURS, LIBRARIES = "rubscreen", ("uvicorn", "dbos", "distributed")
-_LEVEL_OF_LIBRARIES = "INFO"
+OURS = "rubscreen"
+LIBRARIES = {"uvicorn": "INFO", "dbos": "WARNING", "distributed": "WARNING"}
 
 
 class Fields(dict[str, Any]):
@@ -46,15 +46,15 @@ def configure_process(level: str, form: LogFormat = "auto", stream: TextIO | Non
     """Send whatever this process logs to standard error in one form; for a process that is the service.
 
     Handlers that libraries brought are replaced, or two forms would be mixed; one that finds a handler on its
-    logger adds none later.
+    logger adds none later. Each has a handler of its own: distributed silences the one on its logger while a
+    cluster runs.
     """
-    handler = _handler(form, stream or sys.stderr)
-    logging.getLogger().handlers = [handler]
+    logging.getLogger().handlers = [_handler(form, stream or sys.stderr)]
     logging.getLogger().setLevel(logging.WARNING)
-    for name in (OURS, *LIBRARIES):
+    for name, least in ({OURS: level} | LIBRARIES).items():
         logger = logging.getLogger(name)
-        logger.handlers, logger.propagate = [handler], False
-        logger.setLevel(level if name == OURS else _LEVEL_OF_LIBRARIES)
+        logger.handlers, logger.propagate = [_handler(form, stream or sys.stderr)], False
+        logger.setLevel(least)
     for name in ("uvicorn.error", "uvicorn.access"):
         logging.getLogger(name).handlers = []
     logging.captureWarnings(True)

@@ -16,6 +16,7 @@ from datetime import datetime
 
 import httpx
 import pytest
+from distributed.utils import silence_logging_cmgr
 
 from service.app import create_app
 from service.operation import logs
@@ -55,6 +56,15 @@ def test_handlers_that_libraries_brought_write_no_second_line(stream):
     logs.configure_process("INFO", "json", stream)
     logging.getLogger("dbos").error("once")
     assert [line["event"] for line in lines(stream)] == ["once"] and not brought.getvalue()
+
+
+def test_a_library_that_silences_its_own_handler_silences_nobody_else(stream):
+    logs.configure_process("INFO", "json", stream)
+    with silence_logging_cmgr(logging.CRITICAL):  # as distributed does while a cluster runs
+        logging.getLogger("distributed").warning("chatter")
+        logging.getLogger("rubscreen.service").info("heard")
+        logging.getLogger("uvicorn.error").info("heard too")
+    assert [line["event"] for line in lines(stream)] == ["heard", "heard too"]
 
 
 @pytest.mark.parametrize("form", ["json", "text"])
