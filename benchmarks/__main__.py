@@ -24,6 +24,7 @@ MEASUREMENTS = {
     "learning": "benchmarks.learning_curve",
     "gradients": "benchmarks.gradients",
     "speed": "benchmarks.map_speed",
+    "audit": "benchmarks.audit",
 }
 
 

@@ -12,9 +12,24 @@ from fastapi_offline import FastAPIOffline
 
 from sdm_core.version import __version__
 from service.answerer import Answerer
+from service.operation import logs
+from service.operation.desk_metrics import DeskMetrics
+from service.operation.draining import Draining
+from service.operation.metrics import Metrics
+from service.operation.tracing import Tracing
 from service.rest import access_log, errors, gate, openapi
 from service.rest.desk import Desk
-from service.rest.routes import blades, health, models, screenings, stability, trainings, uploads
+from service.rest.readiness import Readiness
+from service.rest.routes import (
+    blades,
+    health,
+    metrics,
+    models,
+    screenings,
+    stability,
+    trainings,
+    uploads,
+)
 from service.settings import Settings
 
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
@@ -26,9 +41,15 @@ class State(TypedDict):
     """What the lifespan gives every request."""
 
     desk: Desk
+    readiness: Readiness
 
 
-def create_app(settings: Settings | None = None, *, screener: Answerer | None = None) -> FastAPI:
+def create_app(
+    settings: Settings | None = None,
+    *,
+    screener: Answerer | None = None,
+    draining: Draining | None = None,
+) -> FastAPI:
     """The service.
 
     Parameters
@@ -37,19 +58,34 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
         Read from the environment when left out.
     screener
         What answers; left out, the shipped model with the exact core behind it.
+    draining
+        Set by the server when it is about to stop.
+
+    Raises
+    ------
+    InvalidInput
+        When traces are asked for and cannot be sent.
     """
-    settings = settings or Settings()
+    settings, draining = settings or Settings(), draining or Draining()
+    counts = Metrics()
+    tracing = None if settings.otel_endpoint is None else Tracing(settings.otel_endpoint)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[State]:
-        access_log.configure(settings.log_level)
+        logs.configure(settings.log_level, settings.log_format)
         # In a thread: the database and the queue of jobs do not open on the event loop.
-        desk = await to_thread.run_sync(Desk.opened, settings, screener)
+        desk = await to_thread.run_sync(Desk.opened, settings, screener, counts, draining.stopping)
+        jobs = None if desk.jobs is None else desk.jobs.jobs.records
+        state = DeskMetrics(desk.model, desk.work, desk.kept, desk.auditor, lambda: draining.begun, jobs)
+        counts.observe(state)
         try:
-            yield {"desk": desk}
+            yield {"desk": desk, "readiness": Readiness(desk, draining)}
         finally:
+            counts.forget(state)
             with CancelScope(shield=True):
                 await to_thread.run_sync(desk.close)
+                if tracing is not None:
+                    await to_thread.run_sync(tracing.close)
 
     # Not plain FastAPI, whose /docs loads its scripts from the internet.
     app: FastAPI = FastAPIOffline(
@@ -62,6 +98,7 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
         redoc_url=None,
         static_url="/docs/assets",
         swagger_ui_parameters={"validatorUrl": None},
+        **({} if tracing is None else {"telemetry": tracing.for_fastapi()}),
     )
     app.include_router(stability.router)
     app.include_router(blades.router)
@@ -70,8 +107,9 @@ def create_app(settings: Settings | None = None, *, screener: Answerer | None = 
     app.include_router(uploads.router)
     app.include_router(trainings.router)
     app.include_router(health.router)
+    app.include_router(metrics.router)
     errors.install(app)
     openapi.install(app)
     app.add_middleware(gate.Gate)
-    app.add_middleware(access_log.AccessLog)
+    app.add_middleware(access_log.AccessLog, metrics=counts, draining=draining, tracing=tracing)
     return app

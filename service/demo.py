@@ -178,6 +178,7 @@ def running_service(log: Path) -> Iterator[str]:
     # Neither the user's data nor keys: both go with the demonstration.
     others = ("RUBSCREEN_DATABASE_URL", "RUBSCREEN_AUTH")
     environment = {name: value for name, value in os.environ.items() if name not in others}
+    environment["RUBSCREEN_DRAIN_S"] = "0"  # nobody else asks it
     with (
         _terminating(),
         log.open("wb") as sink,

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Le
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 Count = Annotated[int, Gt(0)]
@@ -94,8 +94,19 @@ class Settings(BaseSettings):
         Time the computation of one answer may take.
     shutdown_s
         Time the requests being answered have to finish when the service is asked to stop.
+    drain_s
+        How long the service goes on answering after SIGTERM while it says that it is not ready, s; 0 stops
+        at once. Longer than a balancer takes to notice.
+    audit_share_of_time
+        Of one core, for re-solving confident answers exactly in the background; 0 audits nothing.
+    audit_points_per_request
+        Confident answers drawn for that from each request at most; 0 audits nothing.
+    otel_endpoint
+        OTLP collector (HTTP) that spans are sent to; None sends none.
     log_level
         Of the loggers under ``rubscreen``, access log included.
+    log_format
+        ``json`` lines or ``text``; ``auto`` is text on a terminal.
 
     Examples
     --------
@@ -146,7 +157,12 @@ class Settings(BaseSettings):
     max_waiting: Count = 64
     deadline_s: Seconds = 300.0
     shutdown_s: Count = 30
+    drain_s: Annotated[float, Ge(0)] = 5.0
+    audit_share_of_time: Annotated[float, Ge(0), Le(1)] = 0.02
+    audit_points_per_request: Annotated[int, Ge(0)] = 8
+    otel_endpoint: str | None = None
     log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
+    log_format: Literal["auto", "json", "text"] = "auto"
 
 
 def default_data_folder() -> Path:

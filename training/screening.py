@@ -6,10 +6,7 @@ what is certified is what is served.
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -49,13 +46,10 @@ from training.exact_budget import (
     check_budget,
 )
 from training.influence_table import InfluenceTable
+from training.observers import Observers, OnConfident, OnExact
 from training.registry import SHIPPED, Model, load_model
 from training.surrogate import PredictedBoundary
 from training.verification_band import VerificationBand
-
-logger = logging.getLogger("rubscreen.training")
-
-Observer = Callable[[ExactAnswers], None]
 
 
 class Screener:
@@ -67,26 +61,28 @@ class Screener:
         None answers exactly only.
     exact_budget_s
         Most exact work one call may ask for, seconds as estimated before it starts.
-    on_exact
-        Told of every exact answer given; what it raises is logged and costs no answer.
+    on_exact, on_confident
+        Told of every exact answer, and of every verdict given under a certificate (`training.observers`).
     """
 
     def __init__(
         self,
         model: Model | None,
         exact_budget_s: float = 240.0,
-        on_exact: Observer | None = None,
+        on_exact: OnExact | None = None,
+        on_confident: OnConfident | None = None,
     ) -> None:
         self.model = model
         self.exact_budget_s = exact_budget_s
-        self._on_exact = on_exact
+        self._observers = Observers(on_exact, on_confident)
 
     @classmethod
     def default(
         cls,
         models_folder: Path = SHIPPED,
         model_id: str | None = None,
-        on_exact: Observer | None = None,
+        on_exact: OnExact | None = None,
+        on_confident: OnConfident | None = None,
     ) -> Screener:
         """With the active model of a folder, by default the shipped one.
 
@@ -95,7 +91,7 @@ class Screener:
         InvalidInput, DamagedFile
             As `load_model`.
         """
-        return cls(load_model(model_id, models_folder), on_exact=on_exact)
+        return cls(load_model(model_id, models_folder), on_exact=on_exact, on_confident=on_confident)
 
     @property
     def model_id(self) -> str | None:
@@ -121,8 +117,7 @@ class Screener:
             Who answers: "auto" is the surrogate where it is sure, else the exact core.
         alpha
             Rate of unstable designs among those called stable that "auto" must keep; the model is certified
-            for some rates, and None is the
-            certificate's own default. Exact answers keep any.
+            for some rates, and None is the certificate's own default. Exact answers keep any.
 
         Raises
         ------
@@ -161,7 +156,13 @@ class Screener:
                     np.nan if found.unstable_multipliers is None else found.unstable_multipliers,
                     found.wear_lobes,
                 )
-            self._tell(ExactAnswers.from_verdicts, blade, contact, speed[rows], stiffness[rows], stable[rows])
+            self._observers.exact(
+                ExactAnswers.from_verdicts, blade, contact, speed[rows], stiffness[rows], stable[rows]
+            )
+        sure = np.flatnonzero(~exact)
+        self._observers.confident(
+            self.model_id, certificate, blade, contact, speed[sure], stiffness[sure], stable[sure]
+        )
         radius, growth, chatter, error, outside, lobes = columns
         return PointAnswers(
             speed,
@@ -204,9 +205,13 @@ class Screener:
             found = boundary(blade, contact, speed[exact], ke_max, truncation=False)
             critical[exact], chatter[exact] = found.critical_ke, found.chatter_hz
             error[exact] = found.error_estimate
-            self._tell(ExactAnswers.from_crossings, blade, contact, speed[exact], critical[exact], ke_max)
+            self._observers.exact(
+                ExactAnswers.from_crossings, blade, contact, speed[exact], critical[exact], ke_max
+            )
             for i, intervals in zip(np.flatnonzero(exact), found.unstable_ke, strict=True):
                 unstable[i] = intervals
+        free = speed[~exact & np.isnan(critical)]
+        self._observers.confident(self.model_id, decided.certificate, blade, contact, free, ke_max, 1.0)
         return BoundaryAnswers(
             speed,
             ke_max,
@@ -249,7 +254,7 @@ class Screener:
             unit = PERMANENT_S if contact.permanent else ARC_BOUNDARY_S
             self._allow(exact.sum(), unit + GRADIENT_S, blade, speed)
             critical = table.solve(exact, ke_max)
-            self._tell(ExactAnswers.from_crossings, blade, contact, speed[exact], critical, ke_max)
+            self._observers.exact(ExactAnswers.from_crossings, blade, contact, speed[exact], critical, ke_max)
         return table.answers(ke_max, _source(exact), self.model_id, _solver(contact))
 
     def map(
@@ -283,7 +288,13 @@ class Screener:
             row, col = np.nonzero(exact)
             stable[exact] = verdicts(blade, contact, speed[col], stiffness[row])
             probability[exact] = np.nan
-            self._tell(ExactAnswers.from_verdicts, blade, contact, speed[col], stiffness[row], stable[exact])
+            self._observers.exact(
+                ExactAnswers.from_verdicts, blade, contact, speed[col], stiffness[row], stable[exact]
+            )
+        row, col = np.nonzero(~exact)
+        self._observers.confident(
+            self.model_id, certificate, blade, contact, speed[col], stiffness[row], stable[row, col]
+        )
         return MapAnswers(
             speed,
             stiffness,
@@ -376,14 +387,6 @@ class Screener:
         if policy == "surrogate":
             return np.zeros(reason.shape, dtype=bool)
         return reason != CONFIDENT
-
-    def _tell(self, made: Callable[..., ExactAnswers], *found: Any) -> None:
-        if self._on_exact is None:
-            return
-        try:
-            self._on_exact(made(*found))
-        except Exception:
-            logger.exception("exact answers could not be passed on")
 
     def _allow(self, count: int, unit_s: float, blade: Blade, speed: np.ndarray) -> None:
         check_budget(self.exact_budget_s, count, unit_s, blade, speed)

@@ -48,13 +48,17 @@ def run(
 
     from service.app import create_app
     from service.commands.outputs import check_writable
+    from service.operation import logs
+    from service.operation.draining import Draining, DrainingServer
 
     settings = settings_from(models, keep_answers, data)
+    logs.configure_process(settings.log_level, settings.log_format)
     if settings.served_answers_folder is not None:
         check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
     settings = settled(settings, host, listening.getsockname()[0], open_to_all=open_to_all)
-    app = create_app(settings)
+    draining = Draining()
+    app = create_app(settings, draining=draining)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
     typer.echo(
         f"rubscreen: listening on {shown}\n  {shown}/docs    try it in a browser\n  {shown}/readyz  ready?"
@@ -62,12 +66,12 @@ def run(
     typer.echo("  stop with Ctrl-C")
     config = uvicorn.Config(
         app,
-        log_level=settings.log_level.lower(),
+        log_config=None,  # lines of its own form would be mixed with ours
         access_log=False,
         timeout_graceful_shutdown=settings.shutdown_s,
     )
     with listening:
-        uvicorn.Server(config).run(sockets=[listening])
+        DrainingServer(config, draining, settings.drain_s).run(sockets=[listening])
 
 
 def settings_from(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
-import sys
 import time
 import uuid
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.operation.draining import Draining
+from service.operation.logs import Fields, bound
+from service.operation.metrics import Metrics
+from service.operation.tracing import Tracing
 from service.rest.errors import unexpected
 
 REQUEST_ID = "X-Request-Id"
@@ -27,8 +29,10 @@ class AccessLog:
     underscores, so that nothing else can get into the log through it.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    def __init__(
+        self, app: ASGIApp, metrics: Metrics, draining: Draining, tracing: Tracing | None = None
+    ) -> None:
+        self._app, self._metrics, self._draining, self._tracing = app, metrics, draining, tracing
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -37,13 +41,25 @@ class AccessLog:
             return
         request_id = _request_id(Headers(scope=scope))
         scope.setdefault("state", {})["request_id"] = request_id
+        traced = {} if self._tracing is None else self._tracing.mark(request_id)
+        self._metrics.began()
+        try:
+            with bound(request_id=request_id, **traced):
+                await self._serve(request_id, scope, receive, send)
+        finally:
+            self._metrics.ended()
+
+    async def _serve(self, request_id: str, scope: Scope, receive: Receive, send: Send) -> None:
         start, status, sent = time.perf_counter(), None, 0
 
         async def marked(message: Message) -> None:
             nonlocal status, sent
             if message["type"] == "http.response.start":
                 status = message["status"]
-                MutableHeaders(scope=message)[REQUEST_ID] = request_id
+                headers = MutableHeaders(scope=message)
+                headers[REQUEST_ID] = request_id
+                if self._draining.begun:
+                    headers["Connection"] = "close"
             else:
                 sent += len(message.get("body", b""))
             await send(message)
@@ -56,27 +72,20 @@ class AccessLog:
                 raise
             await unexpected(scope, error)(scope, receive, marked)
         finally:
+            seconds = time.perf_counter() - start
             line = {
                 "method": scope["method"],
                 "path": scope["path"],
                 "status": status,
-                "ms": round((time.perf_counter() - start) * 1e3, 1),
+                "ms": round(seconds * 1e3, 1),
                 "bytes": sent,
                 "client": (scope.get("client") or [None])[0],
                 "key": getattr(scope["state"].get("caller"), "key_id", None),
                 "request_id": request_id,
             }
-            access.info(json.dumps(line))  # JSON keeps a line break in a path from making a second line
-
-
-def configure(level: str) -> None:
-    """Send the loggers under ``rubscreen`` to standard error, unless the host program did."""
-    root = logging.getLogger("rubscreen")
-    root.setLevel(level)
-    if not root.handlers and not logging.getLogger().handlers:
-        handler = logging.StreamHandler(sys.stderr)
-        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s %(message)s"))
-        root.addHandler(handler)
+            access.info(Fields(line))
+            route = getattr(scope.get("route"), "path", None)
+            self._metrics.answered(scope["method"], route, status, seconds)
 
 
 def _request_id(headers: Headers) -> str:

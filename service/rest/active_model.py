@@ -11,7 +11,8 @@ from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
 from service.rest.self_check import self_check
 from training.activation import ACTIVE, active_id
-from training.screening import Observer, Screener
+from training.observers import OnConfident, OnExact
+from training.screening import Screener
 
 logger = logging.getLogger("rubscreen.service")
 
@@ -36,6 +37,11 @@ class Answering:
         """Identifier of the model that answers."""
         return getattr(self.screener, "model_id", None)
 
+    @property
+    def unobserved(self) -> Answerer:
+        """The same with nobody told, for probes: their one question is no sample of what is asked."""
+        return Screener(self.screener.model) if isinstance(self.screener, Screener) else self.screener
+
 
 class ActiveModel:
     """Holds what answers.
@@ -51,10 +57,13 @@ class ActiveModel:
         The model being loaded beside it; None while there is none.
     fault
         Why the model that the folder names does not answer; None where it does.
+    switches, refusals
+        Models taken up, and not taken up, since it was made.
     """
 
     def __init__(self, now: Answering) -> None:
         self.now = now
+        self.switches = self.refusals = 0
         self.loading: str | None = None
         self.fault = now.fault
 
@@ -76,15 +85,21 @@ class WatchedModel(ActiveModel):
     ----------
     poll_s
         How often the pointer is looked at, s; 0 is never.
-    on_exact
+    on_exact, on_confident
         As of `Screener`.
     """
 
-    def __init__(self, folder: Path, poll_s: float, on_exact: Observer | None = None) -> None:
-        self._folder, self._on_exact = folder, on_exact
+    def __init__(
+        self,
+        folder: Path,
+        poll_s: float,
+        on_exact: OnExact | None = None,
+        on_confident: OnConfident | None = None,
+    ) -> None:
+        self._folder, self._on_exact, self._on_confident = folder, on_exact, on_confident
         self._seen = _stamp(folder)  # before it is read: what is written in between is noticed
         try:
-            now = Answering(Screener.default(folder, on_exact=on_exact))
+            now = Answering(Screener.default(folder, on_exact=on_exact, on_confident=on_confident))
         except InvalidInput as error:
             logger.error("no surrogate: %s", error)
             now = Answering(Screener(None, on_exact=on_exact), error)
@@ -121,14 +136,19 @@ class WatchedModel(ActiveModel):
             self.fault = None
         except Exception as error:  # whatever it is: a thread that died would never follow again
             self.fault = error if isinstance(error, InvalidInput) else _unexpected(self._folder, error)
+            self.refusals += 1
             logger.error("%s goes on answering: %s", self.now.model_id or "the exact core", self.fault)
         finally:
             self.loading = None
 
     def _exchange(self, model_id: str) -> None:
-        screener = Screener.default(self._folder, model_id, on_exact=self._on_exact)
-        self_check(screener, "auto")
-        old, self.now = self.now.model_id, Answering(screener)
+        screener = Screener.default(
+            self._folder, model_id, on_exact=self._on_exact, on_confident=self._on_confident
+        )
+        found = Answering(screener)
+        self_check(found.unobserved, "auto")
+        old, self.now = self.now.model_id, found
+        self.switches += 1
         logger.info("%s answers from now on, after %s", model_id, old or "the exact core")
 
     def _watch(self, poll_s: float) -> None:

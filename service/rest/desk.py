@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from threading import Event
 from typing import Any
 
-from anyio import CapacityLimiter, to_thread
-
 from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
+from service.audit.auditor import Auditor
+from service.operation.counted_answers import CountedAnswerer
+from service.operation.metrics import Metrics
 from service.records.database import Database, open_database
 from service.rest.active_model import ActiveModel, Answering, WatchedModel
 from service.rest.errors import NotReady
@@ -17,9 +18,8 @@ from service.rest.gate import Access
 from service.rest.job_desk import JobDesk
 from service.rest.limits import WorkQueue
 from service.rest.models_folder import models_folder, prepare_models
-from service.rest.self_check import self_check
 from service.settings import Settings
-from training.answers import PointAnswers
+from training.observers import OnExact
 from training.registry import ModelEntry, list_models, load_model
 from training.served_answers import ServedAnswers
 
@@ -44,6 +44,10 @@ class Desk:
         Batches and trainings; None without a data folder.
     closing
         Set when the service stops: what has no end of its own ends then.
+    metrics
+        Where answers are counted.
+    auditor
+        What holds confident answers to the exact core; None where that is off, or `screener` was given.
     """
 
     settings: Settings
@@ -54,10 +58,17 @@ class Desk:
     access: Access
     jobs: JobDesk | None
     closing: Event
-    _checking: CapacityLimiter
+    metrics: Metrics
+    auditor: Auditor | None
 
     @classmethod
-    def opened(cls, settings: Settings, screener: Answerer | None = None) -> Desk:
+    def opened(
+        cls,
+        settings: Settings,
+        screener: Answerer | None = None,
+        metrics: Metrics | None = None,
+        closing: Event | None = None,
+    ) -> Desk:
         """The desk with `screener`, or with the active model of the settings' folder, and what replaces it.
 
         Raises
@@ -70,17 +81,20 @@ class Desk:
         database = None if folder is None else open_database(folder, settings.database_url)
         access = Access.opened(settings, database)
         prepare_models(settings)
-        kept, model = None, ActiveModel(Answering(screener)) if screener is not None else None
+        kept, auditor, model = None, None, ActiveModel(Answering(screener)) if screener is not None else None
         if model is None:
             if settings.served_answers_folder is not None:
                 kept = ServedAnswers(settings.served_answers_folder)
-            observer = None if kept is None else kept.keep
-            model = WatchedModel(models_folder(settings), settings.models_poll_s, observer)
+            keep = None if kept is None else kept.keep
+            auditor = _auditor(settings, database, keep)
+            draw = None if auditor is None else auditor.draw
+            model = WatchedModel(models_folder(settings), settings.models_poll_s, keep, draw)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
         jobs = None
         if database is not None and folder is not None:
             jobs = JobDesk.opened(settings, database, folder, models_folder(settings))
-        return cls(settings, model, work, kept, database, access, jobs, Event(), CapacityLimiter(1))
+        closing, metrics = closing or Event(), metrics or Metrics()
+        return cls(settings, model, work, kept, database, access, jobs, closing, metrics, auditor)
 
     def close(self) -> None:
         """Stop what still runs, and write what is to be kept."""
@@ -89,6 +103,8 @@ class Desk:
         if self.jobs is not None:
             self.jobs.close()
         self.model.close()
+        if self.auditor is not None:  # before those it writes to
+            self.auditor.close()
         if self.kept is not None:
             self.kept.close()
         self.access.close()
@@ -124,15 +140,19 @@ class Desk:
             When the surrogate is needed and there is none. Under `auto` too: the exact core alone
             is right but a thousand times slower, which a client should choose, not run into.
         """
+        return CountedAnswerer(self.answering_now(policy).screener, self.metrics)
+
+    def answering_now(self, policy: str) -> Answering:
+        """The same with what stands beside it, not counted; raises as `answerer`."""
         now = self.model.now
         if now.fault is not None and policy != "exact":
             remedy = f'{now.fault.remedy}; until then policy "exact" answers'
             raise NotReady(now.fault.field, now.fault.value, remedy)
-        return now.screener
+        return now
 
     def model_for_jobs(self, policy: str) -> str | None:
         """The surrogate that a job accepted now is screened with; raises as `answerer`."""
-        return None if policy == "exact" else getattr(self.answerer(policy), "model_id", None)
+        return None if policy == "exact" else self.answering_now(policy).model_id
 
     def card(self, model_id: str | None) -> dict[str, Any] | None:
         """The card of a model; None where there is no such model any more."""
@@ -143,18 +163,8 @@ class Desk:
         except InvalidInput:
             return None
 
-    async def check(self) -> PointAnswers:
-        """The service's answer to a question with a known answer.
 
-        Not in the queue of work, so that a busy service still counts as ready.
-
-        Raises
-        ------
-        NotReady
-            When there is no surrogate, or the answer is not the known one.
-        """
-        answerer = self.answerer("auto")
-
-        for policy in ("exact", "auto"):
-            found = await to_thread.run_sync(self_check, answerer, policy, limiter=self._checking)
-        return found
+def _auditor(settings: Settings, database: Database | None, keep: OnExact | None) -> Auditor | None:
+    if not settings.audit_share_of_time or not settings.audit_points_per_request:
+        return None
+    return Auditor(settings.audit_share_of_time, settings.audit_points_per_request, database, keep)

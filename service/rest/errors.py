@@ -48,6 +48,10 @@ class NotReady(InvalidInput):
     """The service lacks something it needs for this answer."""
 
 
+class Leaving(NotReady):
+    """The service is about to stop."""
+
+
 class NotAcceptable(InvalidInput):
     """No form of the answer is one the client takes."""
 
@@ -113,6 +117,7 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
     (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),
     (Busy, Kind("busy", "The service is busy", 503, retry_after_s=5)),
+    (Leaving, Kind("draining", "The service is about to stop", 503, retry_after_s=5)),
     (NotReady, Kind("not-ready", "The service is not ready to answer this", 503, retry_after_s=30)),
     (DamagedFile, Kind("damaged-file", "A file of the service is damaged", 503)),
     (NotAcceptable, Kind("not-acceptable", "No such form of the answer", 406)),

@@ -50,10 +50,24 @@ class WorkQueue:
         """Stop what still runs."""
         self._closing.set()
 
+    @property
+    def threads(self) -> int:
+        """Calls that may run at the same time."""
+        return int(self._limiter.total_tokens)
+
+    @property
+    def running(self) -> int:
+        """Calls that run."""
+        return self._limiter.statistics().borrowed_tokens
+
+    @property
+    def waiting(self) -> int:
+        """Calls that wait for a thread."""
+        return self._limiter.statistics().tasks_waiting
+
     def check_room(self) -> None:
         """Raise `Busy` when no further call may wait."""
-        waiting = self._limiter.statistics().tasks_waiting
-        if waiting >= self._max_waiting:
+        if (waiting := self.waiting) >= self._max_waiting:
             raise Busy("service", f"{waiting} requests waiting", "send the request again later")
 
     async def run(self, work: Callable[[], T], request: Request) -> T:

@@ -166,6 +166,14 @@ class Alive(BaseModel):
     version: str
 
 
+class CheckReply(BaseModel):
+    """One of the things that were checked."""
+
+    ok: bool
+    needed: bool = Field(description="False for what is worth knowing and keeps nobody from answering.")
+    detail: str = Field(description="What was found, in words.")
+
+
 class Ready(BaseModel):
     """The service answers."""
 
@@ -174,6 +182,9 @@ class Ready(BaseModel):
     solver: str
     loading: str | None = Field(None, description=_LOADING)
     fault: str | None = Field(None, description=_FAULT)
+    checks: dict[str, CheckReply] = Field(
+        {}, description="Each by its name: self_check, database, disk, audit."
+    )
 
 
 class Model(BaseModel):

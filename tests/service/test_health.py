@@ -17,7 +17,9 @@ from service.rest import active_model
 def test_a_service_with_a_model_is_alive_and_ready(http):
     assert http.get("/healthz").json() == {"status": "alive", "version": __version__}
     said = {"status": "ready", "model": "rule-1", "solver": "rule", "loading": None, "fault": None}
-    assert http.get("/readyz").json() == said
+    ready = http.get("/readyz").json()
+    assert list(ready.pop("checks")) == ["self_check"]
+    assert ready == said
 
 
 def test_a_service_that_answers_wrongly_is_not_ready(own_http, screener, problem):
@@ -37,12 +39,12 @@ def damaged(monkeypatch, screener, serving) -> Iterator[httpx.Client]:
     """A service whose model file is truncated."""
 
     class Damaged:
-        def __new__(cls, model: None, on_exact=None):
+        def __new__(cls, model: None, on_exact=None, on_confident=None):
             screener.model_id = None
             return screener
 
         @staticmethod
-        def default(models_folder, on_exact=None):
+        def default(models_folder, on_exact=None, on_confident=None):
             raise DamagedFile("model.safetensors", "512 of 90112 bytes", "install the service again")
 
     monkeypatch.setattr(active_model, "Screener", Damaged)

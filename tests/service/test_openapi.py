@@ -90,6 +90,7 @@ def test_every_path_of_the_contract_is_there(document):
         "POST /v1/trainings/{job_id}/retry",
         "POST /v1/uploads",
         "DELETE /v1/uploads/{upload_id}",
+        "GET /metrics",
     }
 
 

@@ -8,7 +8,7 @@ from starlette.requests import Request
 from sdm_core.version import __version__
 from service.rest.openapi import problems
 from service.rest.routes.request import the_desk
-from service.rest.schemas import Alive, Ready
+from service.rest.schemas import Alive, CheckReply, Ready
 
 router = APIRouter(tags=["health"])
 
@@ -21,7 +21,16 @@ async def alive() -> Alive:
 
 @router.get("/readyz", responses=problems(500, 503))
 async def ready(request: Request) -> Ready:
-    """The model is loaded, and surrogate and exact core just gave a known answer."""
-    desk = the_desk(request)
-    answers = await desk.check()
-    return Ready(model=answers.model, solver=answers.solver, loading=desk.model.loading, fault=desk.fault)
+    """Surrogate and exact core gave a known answer a second ago at most; database and disk are well."""
+    desk, readiness = the_desk(request), request.state.readiness
+    checks = {
+        name: CheckReply(ok=found.ok, needed=found.needed, detail=found.detail)
+        for name, found in (await readiness.checks()).items()
+    }
+    return Ready(
+        model=desk.answering,
+        solver=readiness.solver,
+        loading=desk.model.loading,
+        fault=desk.fault,
+        checks=checks,
+    )

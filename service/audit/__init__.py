@@ -1,0 +1,1 @@
+"""Confident answers of the surrogate, held to the exact core while the service runs."""

@@ -1,0 +1,1 @@
+"""What keeps the service in sight: metrics, logs, traces, readiness, and leaving without a loss."""
