@@ -41,29 +41,38 @@ def undisturbed(data: Path, question: dict, settings: dict) -> dict[str, str]:
 def killed(
     data: Path, question: dict, settings: dict, services: int, workers: int, rng: random.Random
 ) -> tuple[str, dict]:
-    """Identifier and last document of a job whose processes are killed so often."""
+    """Identifier and last document of a job whose processes are killed so often.
+
+    With a `database_url` among the settings there are two replicas; another takes the place of the killed one,
+    but for the last: that is gone for good.
+    """
     kinds = ["service"] * services + ["worker"] * workers
     rng.shuffle(kinds)
-    job, done = "", 0
-    service = ServiceProcess(data, **settings).ready()
+    replicas = 2 if "database_url" in settings else 1
+    running = [ServiceProcess(data, **settings).ready() for _ in range(replicas)]
     try:
-        job = submit(service.url, question, "killed")
+        job = submit(running[0].url, question, "killed")
         for number, kind in enumerate(kinds, 1):
-            _sleep_into_work(service, job, rng)
-            document = state_of(service.url, job)
+            _sleep_into_work(running[0], job, rng)
+            document = state_of(running[0].url, job)
             if document["state"] in OVER:
                 print(f"over after {number - 1} kills")
                 break
-            done = document["progress"]["done"]
-            if kind == "service":
-                service.kill()
-                service = ServiceProcess(data, **settings).ready()
+            victim = rng.randrange(len(running))
+            if kind == "worker":
+                _kill_one(running[victim], rng)
             else:
-                _kill_one(service, rng)
-            print(f"kill {number:2d}, {kind}: {done} of {document['progress']['total']} done", flush=True)
-        return job, until_over(service.url, job, 3600.0)
+                running[victim].kill()
+                if replicas == 1 or "service" in kinds[number:]:
+                    running[victim] = ServiceProcess(data, **settings).ready()
+                else:
+                    del running[victim]
+            progress = document["progress"]
+            print(f"kill {number:2d}, {kind}: {progress['done']} of {progress['total']} done", flush=True)
+        return job, until_over(running[0].url, job, 3600.0)
     finally:
-        service.kill()
+        for service in running:
+            service.kill()
 
 
 def _sleep_into_work(service: ServiceProcess, job: str, rng: random.Random) -> None:
@@ -94,6 +103,7 @@ def main() -> None:
     parser.add_argument("--grid", type=int, default=64)
     parser.add_argument("--services", type=int, default=20)
     parser.add_argument("--workers", type=int, default=20)
+    parser.add_argument("--database-url", help="of an empty PostgreSQL database: two replicas share it")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=Path("out/kills"))
     asked = parser.parse_args()
@@ -102,7 +112,10 @@ def main() -> None:
     settings = {"min_free_bytes": 0, "max_body_bytes": 64 * 2**20, "log_level": "WARNING"}
     expected = undisturbed(asked.folder / "undisturbed", question, settings)
     data = asked.folder / "killed"
-    job, document = killed(data, question, settings, asked.services, asked.workers, random.Random(asked.seed))
+    if asked.database_url:
+        settings |= {"database_url": asked.database_url, "job_lease_s": 5}
+    rng = random.Random(asked.seed)
+    job, document = killed(data, question, settings, asked.services, asked.workers, rng)
     found = content_of(data, job)
     submitted = sum(note["event"] == "submitted" for note in notes_of(data, job))
     runs = sum(note["event"] == "begun" for note in notes_of(data, job))

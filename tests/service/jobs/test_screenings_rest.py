@@ -1,0 +1,242 @@
+"""A batch over REST with the real engine: handed in, followed, paged, drawn; refused where it has to be."""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+from collections.abc import Iterator
+
+import httpx
+import pyarrow.parquet as pq
+import pytest
+
+from benchmarks.jobs.following import until_over
+from benchmarks.jobs.service_process import ServiceProcess
+from sdm_core.blade import blade_to_dict, example_blade
+from sdm_core.contact import ContactConfiguration
+from service.screening.screen import screen
+from training.screening import Screener
+
+CONTACTS = [{"name": "LE", "weights": {"LE": 1.0}}, {"name": "TE", "weights": {"TE": 1.0}}]
+QUESTION = {
+    "name": "two and a half",
+    "blades": [{"example": "nasa_rotor_37"}, {"example": "generic_compressor_blade"}, {"schema": "none"}],
+    "contacts": CONTACTS,
+    "ke_liner": 9000.0,
+    "criteria": {"least_margin": 0.0},
+    "map_shape": [8, 8],
+    "bad_blades": "skip",
+}
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory) -> Iterator[ServiceProcess]:
+    data = tmp_path_factory.mktemp("data")
+    with ServiceProcess(data, engine_workers=1, min_free_bytes=0, max_job_blades=50, drain_s=0) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def http(service) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=service.url, timeout=60.0) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def done(http, service) -> dict:
+    """The job of `QUESTION`, at its end."""
+    reply = http.post("/v1/screenings", json=QUESTION, headers={"Idempotency-Key": "two"})
+    assert reply.status_code == 202, reply.text
+    job = reply.json()
+    assert reply.headers["location"] == job["links"]["self"] == f"/v1/screenings/{job['id']}"
+    return until_over(service.url, job["id"], 180.0)
+
+
+def changed(**fields) -> dict:
+    return copy.deepcopy(QUESTION) | fields
+
+
+def test_a_batch_ends_with_what_a_screening_of_each_blade_finds(http, done):
+    assert (done["state"], done["not_screened"], done["error"]) == ("done", 1, None)
+    assert (done["progress"]["done"], done["progress"]["total"]) == (3, 3)
+    page = http.get(f"/v1/screenings/{done['id']}/results").json()
+    assert page["complete"] and page["total"] == 4 and page["next"] is None
+    contacts = {entry["name"]: ContactConfiguration(entry["weights"]) for entry in CONTACTS}
+    blades = [example_blade("nasa_rotor_37"), example_blade("generic_compressor_blade")]
+    expected = screen(blades, contacts, Screener.default(), map_shape=(8, 8), ke_liner=9000.0)
+    found = [(r["rank"], r["blade"], r["contact_name"], r["smallest_unstable_ke"]) for r in page["results"]]
+    assert found == [
+        (i, r.blade.name, r.contact_name, None if r.worst is None else r.worst.ke)
+        for i, r in enumerate(expected.results, 1)
+    ]
+    for row, result in zip(page["results"], expected.results, strict=True):
+        assert row["verdict"] == result.verdict
+        assert row["unstable_share"] == result.unstable_share
+        assert row["meets_criteria"] == (result.verdict == "stable")
+    (unscreened,) = page["not_screened"]
+    assert (unscreened["index"], unscreened["source"]) == (2, "blades[2]")
+    assert "schema = none" in unscreened["reason"]
+
+
+def test_the_same_idempotency_key_runs_once(http, done):
+    same = http.post("/v1/screenings", json=QUESTION, headers={"Idempotency-Key": "two"})
+    assert (same.status_code, same.json()["id"]) == (202, done["id"])
+    other = http.post("/v1/screenings", json=changed(name="x"), headers={"Idempotency-Key": "two"})
+    assert other.status_code == 409 and other.json()["field"] == "Idempotency-Key"
+    assert len(http.get("/v1/screenings").json()["jobs"]) == 1
+
+
+def test_results_come_by_pages_filters_and_forms(http, done):
+    base = f"/v1/screenings/{done['id']}/results"
+    whole = http.get(base).json()["results"]
+    pages, where = [], f"{base}?limit=3"
+    while where is not None:
+        page = http.get(where).json()
+        pages += page["results"]
+        where = page["next"]
+    assert pages == whole
+    unstable = http.get(base, params={"verdict": "unstable at some speed"}).json()
+    assert [row for row in whole if row["verdict"] != "stable"] == unstable["results"]
+    missed = http.get(base, params={"meets_criteria": "false"}).json()
+    assert missed["results"] == unstable["results"]
+    edges = http.get(base, params={"contact": "TE"}).json()
+    assert {row["contact_name"] for row in edges["results"]} == {"TE"}
+    lines = http.get(base, headers={"Accept": "text/csv"}).text.splitlines()
+    assert len(lines) == 5 and lines[0].startswith('"rank","blade_index"')
+    content = http.get(base, headers={"Accept": "application/vnd.apache.parquet"}).content
+    table = pq.read_table(io.BytesIO(content))
+    assert table["smallest_unstable_ke"].to_pylist() == [row["smallest_unstable_ke"] for row in whole]
+    assert b"blades[2]" in table.schema.metadata[b"rubscreen.not_screened"]
+
+
+@pytest.mark.parametrize(
+    ("query", "field"),
+    [
+        ({"limit": "0"}, "limit"),
+        ({"limit": "1001"}, "limit"),
+        ({"offset": "-1"}, "offset"),
+        ({"offset": "²"}, "offset"),
+        ({"meets_criteria": "maybe"}, "meets_criteria"),
+    ],
+)
+def test_a_query_that_means_nothing_is_named(http, done, query, field):
+    refused = http.get(f"/v1/screenings/{done['id']}/results", params=query)
+    assert (refused.status_code, refused.json()["field"]) == (422, field)
+
+
+def test_events_tell_the_way_to_the_end(http, done):
+    with http.stream("GET", f"/v1/screenings/{done['id']}/events") as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        lines = list(stream.iter_lines())
+    assert lines[0] == "event: done"
+    assert json.loads(lines[1].removeprefix("data: "))["id"] == done["id"]
+
+
+def test_charts_and_report_are_drawn(http, done):
+    base = f"/v1/screenings/{done['id']}"
+    png = http.get(f"{base}/blades/0/map.png", params={"contact": "LE"})
+    assert (png.status_code, png.content[:4]) == (200, b"\x89PNG")
+    assert http.get(f"{base}/blades/1/boundaries.png").content[:4] == b"\x89PNG"
+    report = http.get(f"{base}/report")
+    assert report.headers["content-type"].startswith("text/html")
+    for said in ("nasa-rotor-37", "generic-compressor-blade", "blades[2]", "<svg"):
+        assert said in report.text
+    least = http.get(f"{base}/report", params={"sheets": "1"}).text
+    assert "The 1 blade with the smallest K<sub>e</sub> of 2 screened" in least
+    for path, field in (
+        ("blades/2/map.png?contact=LE", "blade_index"),
+        ("blades/7/map.png?contact=LE", "blade_index"),
+        ("blades/0/map.png?contact=tip", "contact"),
+    ):
+        missing = http.get(f"{base}/{path}")
+        assert (missing.status_code, missing.json()["field"]) == (404, field)
+
+
+def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
+    blades = [blade_to_dict(example_blade(name)) for name in ("nasa_rotor_37", "generic_compressor_blade")]
+    lines = b"\n".join(json.dumps(blade).encode() for blade in blades)
+    sent = http.post(
+        "/v1/uploads?name=night.jsonl", content=lines, headers={"Content-Type": "application/x-ndjson"}
+    )
+    assert sent.status_code == 201, sent.text
+    question = changed(blades=[{"upload": sent.json()["id"]}])
+    job = http.post("/v1/screenings", json=question).json()
+    assert http.delete(f"/v1/uploads/{sent.json()['id']}").status_code == 204  # the job keeps what it needs
+    assert until_over(service.url, job["id"], 180.0)["state"] == "done"
+    rows = http.get(f"/v1/screenings/{job['id']}/results").json()["results"]
+    same = http.get(f"/v1/screenings/{done['id']}/results").json()["results"]
+    assert [row["source"] for row in rows if row["rank"] == 4] == ["night.jsonl:1"]
+    for row, other in zip(rows, same, strict=True):
+        assert row | {"source": ""} == other | {"source": ""}
+    again = http.post("/v1/screenings", json=question)
+    assert (again.status_code, again.json()["field"]) == (404, "upload")
+
+
+@pytest.mark.parametrize(
+    ("fields", "status", "field"),
+    [
+        ({"bad_blades": "refuse"}, 422, "blades[2].schema"),
+        ({"blades": []}, 422, "blades"),
+        ({"blades": [5], "bad_blades": "refuse"}, 422, "blades[0]"),
+        ({"blades": [{"upload": "../x"}]}, 404, "upload"),
+        ({"blades": [{"example": "no"}]}, 422, "blades[0].example"),
+        ({"blades": [{"example": "nasa_rotor_37"}] * 51}, 413, "blades"),
+        (
+            {"contacts": [{"weights": {"no": 1.0}}], "bad_blades": "refuse"},
+            422,
+            "blades[0].contact.weights.no",
+        ),
+        ({"contacts": [CONTACTS[0], CONTACTS[0]]}, 422, "contacts[1].name"),
+        ({"contacts": [{"weights": {"LE": -1}}]}, 422, "contacts[0].weights.LE"),
+        ({"speed_range_hz": [300.0, 100.0]}, 422, "speed_range_hz"),
+        (
+            {"speed_range_hz": [1.0, 2.0], "speed_range_ratio": [0.1, 0.2]},
+            422,
+            "speed_range_hz, speed_range_ratio",
+        ),
+        ({"ke_liner": 1e9}, 422, "ke_liner"),
+        ({"ke_liner": None}, 422, "criteria.least_margin"),
+        ({"criteria": {"leastest": 1}}, 422, "criteria.leastest"),
+        ({"map_shape": [1, 8]}, 422, "map_shape"),
+        ({"map_shape": [1000, 1000]}, 413, "map_shape"),
+        ({"policy": "guess"}, 422, "policy"),
+        ({"priority": 0}, 422, "priority"),
+        ({"priority": 10}, 422, "priority"),
+        ({"bad_blades": "eat"}, 422, "bad_blades"),
+        ({"blade": {}}, 422, "blade"),
+    ],
+)
+def test_what_cannot_be_screened_is_refused_by_name(http, fields, status, field):
+    refused = http.post("/v1/screenings", json=changed(**fields))
+    assert (refused.status_code, refused.json()["field"]) == (status, field), refused.text
+    assert refused.json()["remedy"]
+
+
+def test_a_cancelled_batch_keeps_what_it_has_and_a_retry_ends_it(http, service):
+    blades = [blade_to_dict(example_blade("nasa_rotor_37")) | {"name": f"rotor {i}"} for i in range(45)]
+    job = http.post("/v1/screenings", json=changed(blades=blades)).json()
+    seen = []
+
+    def look(document: dict) -> None:
+        seen.append(document["progress"]["done"])
+        if 0 < document["progress"]["done"] < 45:
+            http.delete(f"/v1/screenings/{job['id']}")
+
+    stopped = until_over(service.url, job["id"], 180.0, look)
+    assert stopped["state"] == "cancelled" and 0 < max(seen) < 45
+    part = http.get(f"/v1/screenings/{job['id']}/results").json()
+    assert not part["complete"] and 0 < part["total"] < 90
+    assert http.post(f"/v1/screenings/{job['id']}/retry").status_code == 202
+    ended = until_over(service.url, job["id"], 180.0)
+    assert (ended["state"], ended["attempt"]) == ("done", 2)
+    whole = http.get(f"/v1/screenings/{job['id']}/results").json()
+    assert whole["complete"] and whole["total"] == 90
+
+
+def test_nothing_is_found_under_a_name_that_is_none(http):
+    for path in ("/v1/screenings/x", "/v1/screenings/x/results", "/v1/trainings/" + "0" * 32):
+        missing = http.get(path)
+        assert (missing.status_code, missing.json()["field"]) == (404, "id")
+    assert http.get("/v1/screenings", params={"state": "lost"}).json()["field"] == "state"
+    assert http.get("/v1/screenings", params={"after": "x"}).status_code == 404
