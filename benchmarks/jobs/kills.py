@@ -33,7 +33,7 @@ def undisturbed(data: Path, question: dict, settings: dict) -> dict[str, str]:
         job = submit(service.url, question, "undisturbed")
         began = time.monotonic()
         end = until_over(service.url, job, 7200.0)
-        print(f"undisturbed: {end['state']} in {time.monotonic() - began:.0f} s")
+        print(f"undisturbed: {end['state']} in {time.monotonic() - began:.0f} s", flush=True)
         assert end["state"] == "done", end
         return content_of(data, job)
 
@@ -43,7 +43,7 @@ def killed(
 ) -> tuple[str, dict]:
     """Identifier and last document of a job whose processes are killed so often.
 
-    With a `database_url` among the settings there are two replicas; another takes the place of the killed one,
+    With a `database_url` among the settings there are two replicas; another takes the place of a killed one,
     but for the last: that is gone for good.
     """
     kinds = ["service"] * services + ["worker"] * workers
