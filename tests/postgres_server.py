@@ -27,47 +27,70 @@ def binaries() -> Path | None:
 needs_postgres = pytest.mark.skipif(binaries() is None, reason="PostgreSQL is not installed")
 
 
+class PostgresServer:
+    """A server of its own folder and port; `url` names no database."""
+
+    def __init__(self) -> None:
+        found = binaries()
+        assert found is not None
+        self._bin = found
+        # Not under pytest's own folder: the server does not run as root, which that may belong to.
+        self._folder = Path(tempfile.mkdtemp(prefix="rubscreen-postgres-"))
+        self._as_postgres: list[str] = []
+        if os.geteuid() == 0:
+            user = pwd.getpwnam("postgres")
+            os.chown(self._folder, user.pw_uid, user.pw_gid)
+            ids = [f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}"]
+            self._as_postgres = ["setpriv", *ids, "--clear-groups"]
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.url = f"postgresql://postgres@127.0.0.1:{port}"
+        self._data = str(self._folder / "data")
+        settings = f"-p {port} -k {self._folder} -c listen_addresses=127.0.0.1 -c max_connections=200"
+        self._options = f"{settings} -c fsync=off"
+        self._run("initdb", "-D", self._data, "-U", "postgres", "-A", "trust", "-N")
+        self.start()
+
+    def start(self) -> None:
+        """Let it answer."""
+        log = str(self._folder / "log")
+        self._run("pg_ctl", "-D", self._data, "-w", "-l", log, "-o", self._options, "start")
+
+    def stop(self) -> None:
+        """Cut every connection off."""
+        self._run("pg_ctl", "-D", self._data, "-m", "immediate", "stop")
+
+    def remove(self) -> None:
+        """Stop it for good."""
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _run(self, program: str, *arguments: str) -> None:
+        command = [*self._as_postgres, str(self._bin / program), *arguments]
+        subprocess.run(command, check=True, capture_output=True, cwd=self._folder, timeout=120)
+
+
 @contextmanager
-def running_postgres() -> Iterator[str]:
-    """The URL of an empty server, without a database's name."""
-    bin_folder = binaries()
-    assert bin_folder is not None
-    # Not under pytest's own folder: the server does not run as root, which that may belong to.
-    folder = Path(tempfile.mkdtemp(prefix="rubscreen-postgres-"))
-    as_postgres: list[str] = []
-    if os.geteuid() == 0:
-        user = pwd.getpwnam("postgres")
-        os.chown(folder, user.pw_uid, user.pw_gid)
-        as_postgres = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups"]
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-
-    def run(program: str, *arguments: str) -> None:
-        command = [*as_postgres, str(bin_folder / program), *arguments]
-        subprocess.run(command, check=True, capture_output=True, cwd=folder, timeout=120)
-
-    data = str(folder / "data")
-    run("initdb", "-D", data, "-U", "postgres", "-A", "trust", "-N")
-    options = f"-p {port} -k {folder} -c listen_addresses=127.0.0.1 -c fsync=off -c max_connections=200"
-    run("pg_ctl", "-D", data, "-w", "-l", str(folder / "log"), "-o", options, "start")
+def running_postgres() -> Iterator[PostgresServer]:
+    """A server that is gone afterwards."""
+    server = PostgresServer()
     try:
-        yield f"postgresql://postgres@127.0.0.1:{port}"
+        yield server
     finally:
-        run("pg_ctl", "-D", data, "-m", "immediate", "stop")
-        shutil.rmtree(folder, ignore_errors=True)
+        server.remove()
 
 
 @contextmanager
-def empty_database(server: str) -> Iterator[str]:
+def empty_database(server: PostgresServer) -> Iterator[str]:
     """The URL of a database that nothing is in."""
     import psycopg
 
     name = f"rub_{uuid.uuid4().hex[:12]}"
-    with psycopg.connect(f"{server}/postgres", autocommit=True) as connection:
+    with psycopg.connect(f"{server.url}/postgres", autocommit=True) as connection:
         connection.execute(f"create database {name}")
     try:
-        yield f"{server}/{name}"
+        yield f"{server.url}/{name}"
     finally:
-        with psycopg.connect(f"{server}/postgres", autocommit=True) as connection:
+        with psycopg.connect(f"{server.url}/postgres", autocommit=True) as connection:
             connection.execute(f"drop database {name} with (force)")

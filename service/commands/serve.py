@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import errno
+import logging
+import os
 import socket
+import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -72,6 +76,16 @@ def run(
     )
     with listening:
         DrainingServer(config, draining, settings.drain_s).run(sockets=[listening])
+    _leave_none_behind()
+
+
+def _leave_none_behind() -> None:
+    """End the process though a thread of the queue still waits for a database that has gone."""
+    if any(not thread.daemon and thread is not threading.main_thread() for thread in threading.enumerate()):
+        logging.getLogger("rubscreen.service").warning("a thread does not stop: it is left")
+        logging.shutdown()
+        sys.stdout.flush()
+        os._exit(0)
 
 
 def settings_from(

@@ -89,6 +89,7 @@ class Jobs:
         settings: JobSettings,
         tick: Callable[[Jobs, str, dict[str, Any]], None] = lambda jobs, at, context: None,
     ) -> None:
+        self._database = database
         self.records, self.folders = JobRecords(database), JobFolders(data_folder)
         self._kinds, self.settings = kinds, settings
         self._replicas = Replicas(database)
@@ -205,8 +206,14 @@ class Jobs:
             gone = self._running.wait_for(lambda: not self._controls, patience_s)
         if not gone:
             logger.error("jobs that did not stop: %s", ", ".join(self._controls))
-        self.queue.close(hand_back=gone)
-        if gone:
+        # The queue asks a database that is gone again and again: it gets so long, and no longer.
+        there = self._database.answers()
+        closer = threading.Thread(target=self.queue.close, args=(gone and there,), daemon=True)
+        closer.start()
+        closer.join(patience_s)
+        if closer.is_alive():
+            logger.error("the queue does not close: what was begun here is taken over after the lease")
+        elif gone and there:
             self._replicas.forget(self._replica)
         self._release()
 

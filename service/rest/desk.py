@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from threading import Event
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from sdm_core.errors import InvalidInput
 from service.answerer import Answerer
 from service.audit.auditor import Auditor
+from service.jobs.screening.watched import watching
 from service.operation.counted_answers import CountedAnswerer
 from service.operation.metrics import Metrics
 from service.records.database import Database, open_database
@@ -18,6 +20,7 @@ from service.rest.gate import Access
 from service.rest.job_desk import JobDesk
 from service.rest.limits import WorkQueue
 from service.rest.models_folder import models_folder, prepare_models
+from service.screening.screen import ScreeningResult
 from service.settings import Settings
 from training.observers import OnExact
 from training.registry import ModelEntry, list_models, load_model
@@ -81,7 +84,12 @@ class Desk:
         database = None if folder is None else open_database(folder, settings.database_url)
         access = Access.opened(settings, database)
         prepare_models(settings)
-        kept, auditor, model = None, None, ActiveModel(Answering(screener)) if screener is not None else None
+        kept, auditor, draw, model = (
+            None,
+            None,
+            None,
+            ActiveModel(Answering(screener)) if screener is not None else None,
+        )
         if model is None:
             if settings.served_answers_folder is not None:
                 kept = ServedAnswers(settings.served_answers_folder)
@@ -90,10 +98,11 @@ class Desk:
             draw = None if auditor is None else auditor.draw
             model = WatchedModel(models_folder(settings), settings.models_poll_s, keep, draw)
         work = WorkQueue(settings.worker_threads, settings.max_waiting, settings.deadline_s)
+        closing, metrics = closing or Event(), metrics or Metrics()
         jobs = None
         if database is not None and folder is not None:
-            jobs = JobDesk.opened(settings, database, folder, models_folder(settings))
-        closing, metrics = closing or Event(), metrics or Metrics()
+            on_stored = watching(_counting(metrics), (lambda answers: None) if draw is None else draw)
+            jobs = JobDesk.opened(settings, database, folder, models_folder(settings), on_stored)
         return cls(settings, model, work, kept, database, access, jobs, closing, metrics, auditor)
 
     def close(self) -> None:
@@ -162,6 +171,13 @@ class Desk:
             return load_model(model_id, models_folder(self.settings)).card
         except InvalidInput:
             return None
+
+
+def _counting(metrics: Metrics) -> Callable[[ScreeningResult], None]:
+    def count(result: ScreeningResult) -> None:
+        metrics.count_answers("screening", result.contact, result.map.source, result.map.reason)
+
+    return count
 
 
 def _auditor(settings: Settings, database: Database | None, keep: OnExact | None) -> Auditor | None:

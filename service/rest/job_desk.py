@@ -11,6 +11,7 @@ from service.jobs.job import SCREENING, TRAINING
 from service.jobs.jobs import Jobs, JobSettings, Kind
 from service.jobs.screening.checks import limits_of
 from service.jobs.screening.kind import ScreeningKind
+from service.jobs.screening.watched import OnStored
 from service.jobs.training.kind import TrainingKind
 from service.jobs.uploads import Uploads
 from service.records.database import Database
@@ -30,9 +31,14 @@ class JobDesk:
 
     @classmethod
     def opened(
-        cls, settings: Settings, database: Database, data_folder: Path, models_folder: Path
+        cls,
+        settings: Settings,
+        database: Database,
+        data_folder: Path,
+        models_folder: Path,
+        on_stored: OnStored,
     ) -> JobDesk:
-        """The jobs of the data folder.
+        """The jobs of the data folder; `on_stored` is told of every chunk of a screening.
 
         Raises
         ------
@@ -43,7 +49,7 @@ class JobDesk:
         address = checked_scheduler(settings.scheduler, tls)
         engine = DaskEngine(address, settings.engine_workers, data_folder / SCRATCH, tls)
         kinds: dict[str, Kind] = {
-            SCREENING: ScreeningKind(engine, limits_of(settings), settings.min_free_bytes),
+            SCREENING: ScreeningKind(engine, limits_of(settings), settings.min_free_bytes, on_stored),
             TRAINING: TrainingKind(models_folder, settings.served_answers_folder, settings.min_free_bytes),
         }
         at_once = {SCREENING: settings.jobs_at_once, TRAINING: 1} if settings.run_jobs else {}

@@ -23,6 +23,7 @@ from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade, 
 from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import ScreeningRequest
 from service.jobs.screening.results import write_results
+from service.jobs.screening.watched import OnStored
 
 # Chunks in the engine for each of its workers: enough that none waits, few enough that another job gets in.
 _AHEAD = 2
@@ -51,10 +52,19 @@ class ScreeningKind:
         Settings that bound what the exact core is asked (`service.rest.limits.check_reach`).
     reserve_bytes
         Room to leave on the disk.
+    on_stored
+        Told of every chunk, once it is stored.
     """
 
-    def __init__(self, engine: Engine, limits: Mapping[str, Any], reserve_bytes: int) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        limits: Mapping[str, Any],
+        reserve_bytes: int,
+        on_stored: OnStored = lambda content: None,
+    ) -> None:
         self._engine, self._limits, self._reserve = engine, dict(limits), reserve_bytes
+        self._on_stored = on_stored
 
     def run(self, folder: JobFolder, control: Control) -> None:
         """Compute what is not stored, then write the ranking.
@@ -127,6 +137,7 @@ class ScreeningKind:
                         continue
                     self._keep(control, partial(store.put, number, content), len(content))
                     folder.note(event="stored", chunk=number)
+                    self._on_stored(content)
                     tally.done += len(blades)
                     tally.not_screened += len(rows_of(content)[1])
                     control.report(done=tally.done, not_screened=tally.not_screened, stage="screening")

@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from postgres_server import empty_database, needs_postgres, running_postgres
+from postgres_server import PostgresServer, empty_database, needs_postgres, running_postgres
 
 from service.records.database import Database, database_url
 
 
 @pytest.fixture(scope="session")
-def postgres() -> Iterator[str]:
+def postgres() -> Iterator[PostgresServer]:
     with running_postgres() as server:
         yield server
 
 
 @pytest.fixture
-def postgres_url(postgres: str) -> Iterator[str]:
+def postgres_url(postgres: PostgresServer) -> Iterator[str]:
     with empty_database(postgres) as url:
         yield url
 

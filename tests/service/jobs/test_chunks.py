@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdm_core.blade import blade_to_dict, example_blade
+from sdm_core.boundary import verdicts
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile
 from service.jobs.screening import blade_lines
@@ -15,6 +16,7 @@ from service.jobs.screening.chunk import chunk_payload, compute_chunk
 from service.jobs.screening.chunk_content import ChunkContent, rows_of
 from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import Criteria, ScreeningRequest
+from service.jobs.screening.watched import watching
 from service.screening.screen import screen
 from service.settings import Settings
 from training.activation import active_id
@@ -118,6 +120,20 @@ def test_a_stored_chunk_that_was_altered_is_taken_away_to_be_computed_again(tmp_
         store.read(0)
     assert store.verified() == store.numbers() == {2}
     assert store.read(2) == b"content 2"
+
+
+def test_confident_answers_of_a_chunk_are_told_for_the_audit_and_no_others(stored):
+    counted, drawn = [], []
+    watching(counted.append, drawn.append)(stored)
+    assert [result.contact_name for result in counted] == ["LE", "TE", "LE", "TE"]
+    for result, answers in zip(counted, drawn, strict=True):
+        sure = (result.map.source == "surrogate") & (result.map.reason == "confident")
+        assert len(answers) == sure.sum() > 0
+        assert (answers.model, answers.alpha) == (result.map.model, result.map.certificate.alpha)
+        exact = verdicts(answers.blade, answers.contact, answers.speed_hz, answers.ke)
+        np.testing.assert_array_equal(answers.stable, exact == 1.0)
+    watching(counted.append, drawn.append)(b"not whole")  # is logged
+    assert len(counted) == 4
 
 
 def test_what_no_blade_can_meet_is_told_by_name():

@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import random
+import time
 from pathlib import Path
 
+import httpx
 import pytest
-from postgres_server import needs_postgres
+from postgres_server import empty_database, needs_postgres, running_postgres
 
 from benchmarks.jobs.following import computed_after_stored, content_of, notes_of, submit, until_over
 from benchmarks.jobs.kills import killed, undisturbed
@@ -60,3 +62,25 @@ def test_a_service_that_is_asked_to_stop_hands_its_job_to_the_next(tmp_path, exp
     with ServiceProcess(tmp_path, **SETTINGS) as service:
         document = until_over(service.url, job, 180.0)
     assert_whole(tmp_path, job, document, expected)
+
+
+@needs_postgres
+def test_a_database_that_goes_away_costs_time_and_holds_up_no_end(tmp_path, expected):
+    with running_postgres() as server, empty_database(server) as url:
+        settings = SETTINGS | {"database_url": url, "job_lease_s": 3}
+        with ServiceProcess(tmp_path, **settings) as service:
+            job = submit(service.url, QUESTION, "away")
+            time.sleep(5.0)
+            server.stop()
+            assert httpx.get(f"{service.url}/readyz", timeout=60.0).status_code == 503
+            refused = httpx.get(f"{service.url}/v1/screenings/{job}", timeout=60.0)
+            assert (refused.status_code, refused.json()["field"]) == (503, "database")
+            time.sleep(5.0)
+            server.start()
+            document = until_over(service.url, job, 180.0)
+            assert_whole(tmp_path, job, document, expected)
+            submit(service.url, QUESTION, "left behind")
+            time.sleep(3.0)
+            server.stop()
+            assert service.stop(patience_s=60.0) == 0
+            server.start()
