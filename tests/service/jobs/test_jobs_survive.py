@@ -79,7 +79,7 @@ def test_a_database_that_goes_away_costs_time_and_holds_up_no_end(tmp_path, expe
             server.start()
             document = until_over(service.url, job, 180.0)
             assert_whole(tmp_path, job, document, expected)
-            submit(service.url, QUESTION, "left behind")
+            submit(service.url, QUESTION, "left-behind")
             time.sleep(3.0)
             server.stop()
             assert service.stop(patience_s=60.0) == 0
