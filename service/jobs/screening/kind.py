@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import RubscreenError
@@ -51,10 +52,20 @@ class ScreeningKind:
         Settings that bound what the exact core is asked (`service.rest.limits.check_reach`).
     reserve_bytes
         Room to leave on the disk.
+    models_folder
+        Where the models are now: not always where they were when the job was accepted, for the data may have
+        moved. None takes the request's word.
     """
 
-    def __init__(self, engine: Engine, limits: Mapping[str, Any], reserve_bytes: int) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        limits: Mapping[str, Any],
+        reserve_bytes: int,
+        models_folder: Path | None = None,
+    ) -> None:
         self._engine, self._limits, self._reserve = engine, dict(limits), reserve_bytes
+        self._models = models_folder
 
     def run(self, folder: JobFolder, control: Control) -> None:
         """Compute what is not stored, then write the ranking.
@@ -69,6 +80,8 @@ class ScreeningKind:
             As `Control.check`.
         """
         asked = folder.request()
+        if self._models is not None:
+            asked["models_folder"] = str(self._models.resolve())
         request = ScreeningRequest.from_dict(asked)
         store = ChunkStore(folder.chunks)
         control.report(stage="looking at what is stored", now=True)
