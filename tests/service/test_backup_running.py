@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
+import signal
 import subprocess
 import sys
 import tarfile
@@ -18,6 +18,7 @@ from typing import Any
 import httpx
 import pytest
 from postgres_server import empty_database, needs_postgres, running_postgres
+from served_process import ServedProcess, free_port
 
 from sdm_core.blade import blade_to_dict, example_blade
 
@@ -25,7 +26,7 @@ BLADE = blade_to_dict(example_blade("nasa_rotor_37"))
 # So many that a chunk is one blade, and takes some seconds.
 CONTACTS = [{"name": f"c{i}", "weights": {"LE": 1.0, "TE": 0.1 + 0.05 * i}} for i in range(16)]
 FORMS = ("application/json", "text/csv", "application/vnd.apache.parquet")
-MANY = 8
+MANY = 6
 
 
 def rubscreen(*arguments: str, url: str | None) -> list[str]:
@@ -40,34 +41,18 @@ def rubscreen(*arguments: str, url: str | None) -> list[str]:
 
 @contextmanager
 def service(data: Path, url: str | None) -> Iterator[httpx.Client]:
-    """A service in a process of its own, as `rubscreen serve` starts it."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    environment = os.environ | {"RUBSCREEN_ENGINE_WORKERS": "1", "RUBSCREEN_JOB_LEASE_S": "4"}
-    if url is not None:
-        environment["RUBSCREEN_DATABASE_URL"] = url
-    command = rubscreen("serve", "--data", str(data), "--port", str(port), url=None)
-    log = data.with_suffix(".log")
-    with log.open("w") as written:
-        process = subprocess.Popen(command, env=environment, stdout=written, stderr=written)
+    """A service in a process of its own."""
+    settings = {"engine_workers": "1", "job_lease_s": "4", "drain_s": "0"}
+    data.mkdir(exist_ok=True)
+    process = ServedProcess(data, free_port(), settings if url is None else settings | {"database_url": url})
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:
-            deadline = time.monotonic() + 120.0
-            while not _alive(client):
-                assert process.poll() is None and time.monotonic() < deadline, log.read_text()
-                time.sleep(0.2)
+        process.start()
+        with httpx.Client(base_url=process.url, timeout=60.0, trust_env=False) as client:
             yield client
+        process.tell(signal.SIGTERM)
+        assert process.ended() == 0
     finally:
-        process.terminate()
-        process.wait(60)
-
-
-def _alive(client: httpx.Client) -> bool:
-    try:
-        return client.get("/healthz").status_code == 200
-    except httpx.TransportError:
-        return False
+        process.kill()
 
 
 def screened(client: httpx.Client, many: int, contacts: Any) -> str:
