@@ -120,7 +120,8 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "kind", [tarfile.CONTTYPE, tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE, tarfile.CHRTYPE, tarfile.DIRTYPE]
+    "kind",
+    [tarfile.CONTTYPE, tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE, tarfile.CHRTYPE, tarfile.DIRTYPE],
 )
 def test_what_is_no_plain_file_is_refused(tmp_path, kind):
     member = tarfile.TarInfo("data/link")
