@@ -11,13 +11,16 @@ from sdm_core.errors import InvalidInput, RubscreenError
 from sdm_core.version import __version__
 from service.commands import (
     assess,
+    backup,
     blade,
     boundary,
     demo,
+    jobs,
     keys,
     map,
     models,
     paper,
+    restore,
     screen,
     sensitivities,
     serve,
@@ -68,12 +71,13 @@ def rubscreen(
     """Screen turbomachinery blades for rub-induced instability."""
 
 
-for command in (demo, serve, screen, assess, map, boundary, sensitivities, train, paper):
+for command in (demo, serve, screen, assess, map, boundary, sensitivities, train, paper, backup, restore):
     app.command(command.__name__.rpartition(".")[2])(command.run)
 
 app.add_typer(blade.app, name="blade")
 app.add_typer(models.app, name="models")
 app.add_typer(keys.app, name="keys")
+app.add_typer(jobs.app, name="jobs")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """``python -m benchmarks.jobs.load``: requests a second and latency of one service process under wrk.
 
-One point, a hundred points, a map of 64 × 64; a bare FastAPI endpoint that answers a constant; all of it again
-beside a running screening; a thousand open connections; clients that send a byte a second.
+One point, a hundred points, a map of 64 × 64; a bare FastAPI endpoint that answers a constant; all of it
+again beside a running screening; a thousand open connections; clients that send a byte a second.
 """
 
 from __future__ import annotations

@@ -122,6 +122,16 @@ DataOption = Annotated[
         show_default=False,
     ),
 ]
+DatabaseOption = Annotated[
+    str | None,
+    typer.Option(
+        "--database-url",
+        metavar="URL",
+        help="The database, where it is not in the data folder. Left out: RUBSCREEN_DATABASE_URL, which "
+        "other users of this machine cannot read, as they can a command line with a password.",
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[
     str | None,
     typer.Option(

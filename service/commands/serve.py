@@ -9,7 +9,7 @@ import socket
 import sys
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -89,7 +89,10 @@ def _leave_none_behind() -> None:
 
 
 def settings_from(
-    models: str | None = None, keep_answers: str | None = None, data: str | None = None
+    models: str | None = None,
+    keep_answers: str | None = None,
+    data: str | None = None,
+    database_url: str | None = None,
 ) -> Settings:
     """The settings of the environment, and folders over theirs; with a data folder in any case.
 
@@ -104,9 +107,11 @@ def settings_from(
     from service.settings import Settings, default_data_folder
 
     folders = {"models_folder": models, "served_answers_folder": keep_answers, "data_folder": data}
-    given = {name: Path(folder) for name, folder in folders.items() if folder is not None}
+    given: dict[str, Any] = {name: Path(folder) for name, folder in folders.items() if folder is not None}
+    if database_url is not None:
+        given["database_url"] = database_url
     try:
-        settings = Settings(**given)  # type: ignore[arg-type]
+        settings = Settings(**given)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         name = "RUBSCREEN_" + "_".join(str(part) for part in fault["loc"]).upper()

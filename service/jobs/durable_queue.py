@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -24,9 +25,11 @@ from sdm_core.errors import InvalidInput
 
 # Of what is in the queue, not of the code: jobs accepted by an older program run on a newer one.
 QUEUE_VERSION = "1"
-_SCHEMA, _WORKFLOW, _DUE, _SCHEDULE = "rubscreen_queue", "job", "due", "training"
+SCHEMA = "rubscreen_queue"  # of PostgreSQL
+_WORKFLOW, _DUE, _SCHEDULE = "job", "due", "training"
 # A job killed more often than this by its process's end is given up by DBOS.
 _MOST_RECOVERIES = 10_000
+_PAGE, _CALLS_KEPT = 500, 20
 _OVER = ("SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED")
 logging.getLogger("dbos").setLevel(logging.WARNING)
 logger = logging.getLogger("rubscreen.jobs")
@@ -112,7 +115,7 @@ class DurableQueue:
             "system_database_url": _queue_url(url),
             "application_version": QUEUE_VERSION,
             "executor_id": replica,
-            "dbos_system_schema": _SCHEMA,
+            "dbos_system_schema": SCHEMA,
             "serializer": _Json(),
             "log_level": "WARNING",
             "enable_otlp": False,
@@ -169,6 +172,30 @@ class DurableQueue:
         for attempt in range(1, attempts + 1):
             if DBOS.get_workflow_status(_run_id(job_id, attempt)) is not None:
                 DBOS.delete_workflow(_run_id(job_id, attempt))
+
+    def forget_orphans(self, known: Callable[[list[str]], set[str]]) -> int:
+        """Remove runs that are over and whose job is gone, and all but the last calls of a schedule.
+
+        Parameters
+        ----------
+        known
+            Those of some jobs that are there.
+
+        Returns
+        -------
+        How many were removed.
+        """
+        # Listed whole before any is removed: pages would shift.
+        runs = _listed(_WORKFLOW)
+        there: set[str] = set()
+        for i in range(0, len(runs), _PAGE):
+            there |= known(sorted({_job_id(run) for run in runs[i : i + _PAGE]}))
+        orphans = [run for run in runs if _job_id(run) not in there]
+        # That of a time that is gone is never looked at again: the schedule itself says how far it is.
+        orphans += _listed(_DUE)[:-_CALLS_KEPT]
+        for i in range(0, len(orphans), _PAGE):
+            DBOS.delete_workflows(orphans[i : i + _PAGE])
+        return len(orphans)
 
     def schedule(self, cron: str, timezone: str, context: dict[str, Any]) -> None:
         """Be called again and again, for times missed while no process ran too; replaces the one before.
@@ -245,8 +272,33 @@ def _run_id(job_id: str, attempt: int) -> str:
     return f"{job_id}-{attempt}"
 
 
+def _job_id(run_id: str) -> str:
+    return run_id.rpartition("-")[0]
+
+
+def _listed(workflow: str) -> list[str]:
+    """Identifiers of the runs of a workflow that are over, oldest first."""
+    found: list[str] = []
+    while True:
+        page = DBOS.list_workflows(
+            name=workflow,
+            status=list(_OVER),
+            limit=_PAGE,
+            offset=len(found),
+            load_input=False,
+            load_output=False,
+        )
+        found += [run.workflow_id for run in page]
+        if len(page) < _PAGE:
+            return found
+
+
+def queue_file(database: Path) -> Path:
+    """The queue's file beside a SQLite database: in one, two kinds of writers would wait for each other."""
+    return database.with_name(f"{database.name}-queue")
+
+
 def _queue_url(url: URL) -> str:
     if url.drivername.startswith("sqlite"):
-        # A file of its own: two writers with transactions of their own would wait for each other.
-        url = url.set(database=f"{url.database}-queue")
+        url = url.set(database=str(queue_file(Path(url.database or ""))))
     return url.render_as_string(hide_password=False)

@@ -7,7 +7,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from service.jobs.durable_queue import DurableQueue, HandedBack
 from service.jobs.errors import NoRoom
 from service.jobs.job import ACTIVE, KINDS, Fault, Job, State
 from service.jobs.job_folder import JobFolder, JobFolders
+from service.jobs.retention import Keep, Retention, RetentionThread
 from service.records.database import Database
 from service.records.jobs import JobRecords
 from service.records.replicas import Replicas
@@ -58,11 +59,14 @@ class JobSettings:
         Time after which the jobs of a replica that says nothing are taken over.
     reserve_bytes
         Room that is left free on the disk.
+    keep
+        How long what is over is kept.
     """
 
     at_once: Mapping[str, int]
     lease_s: float = 30.0
     reserve_bytes: int = 64 * 2**20
+    keep: Keep = field(default_factory=Keep)
 
 
 class Jobs:
@@ -113,6 +117,8 @@ class Jobs:
             raise
         self._tending = threading.Thread(target=self._tend, name="jobs", daemon=True)
         self._tending.start()
+        retention = Retention(self.records, self.folders, self.queue)
+        self._retention = RetentionThread(retention, data_folder, settings.keep)
 
     def submit(self, job: Job, fill: Callable[[Path], None]) -> tuple[Job, bool]:
         """Accept a job: when this returns, it is on the disk and will be run.
@@ -148,6 +154,7 @@ class Jobs:
         except BaseException:
             self.folders.remove(job.id)
             raise
+        self.folders.unmark(kept.id)
         if kept.id != job.id:  # the same request came twice at the same time
             self.folders.remove(job.id)
             return kept, False
@@ -188,12 +195,6 @@ class Jobs:
         self._put(job)
         return job
 
-    def remove(self, job: Job) -> None:
-        """Forget a job that is over, and its files."""
-        self.folders.remove(job.id)
-        self.records.remove(job.id)
-        self.queue.forget(job.id, job.attempt)
-
     def running(self) -> int:
         """Jobs that this process runs now."""
         return len(self._controls)
@@ -201,6 +202,7 @@ class Jobs:
     def close(self, patience_s: float = 20.0) -> None:
         """Stop; what runs is handed back within moments, for another process or the next start."""
         self._closing.set()
+        self._retention.close()
         self._tending.join()
         with self._running:
             gone = self._running.wait_for(lambda: not self._controls, patience_s)
@@ -279,7 +281,6 @@ class Jobs:
             try:
                 if turn % 4 == 0:
                     self._queue_forgotten()
-                    self.folders.sweep()
                 self._replicas.say(self._replica)
                 for silent in self._replicas.silent(self.settings.lease_s, but=self._replica):
                     logger.warning("%s says nothing any more: its jobs are taken over", silent)

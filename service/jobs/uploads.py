@@ -6,11 +6,11 @@ import hashlib
 import json
 import os
 import re
-import time
 import uuid
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -149,17 +149,6 @@ class Uploads:
         """Delete a file; raises as `get`."""
         remove_folder(self._folder / self.get(upload_id, owner).id)
 
-    def remove_older(self, age_s: float) -> int:
-        """Delete what came longer ago than `age_s`; how many files."""
-        old = [
-            path
-            for path in self._folder.iterdir()
-            if _ID.fullmatch(path.name) and time.time() - path.stat().st_mtime > age_s
-        ]
-        for path in old:
-            remove_folder(path)
-        return len(old)
-
     def documents(self, upload: Upload, most: int) -> Iterator[tuple[str, Any]]:
         """(source, parsed JSON) of each blade in a file, at most `most`.
 
@@ -169,13 +158,37 @@ class Uploads:
             Naming the place within the file that is no JSON.
         UploadTooLarge
             For more blades, or a zip that inflates beyond measure.
+        NoSuchUpload
+            When it was deleted meanwhile.
         """
         path = self._folder / upload.id / _CONTENT
         read = {JSON: _of_json, LINES: _of_lines, ZIP: _of_zip}[upload.form]
-        for count, (source, document) in enumerate(read(path, upload), 1):
-            if count > most:
-                raise UploadTooLarge(upload.name, f"more than {most} blades", "split the file")
-            yield source, document
+        try:
+            for count, (source, document) in enumerate(read(path, upload), 1):
+                if count > most:
+                    raise UploadTooLarge(upload.name, f"more than {most} blades", "split the file")
+                yield source, document
+        except FileNotFoundError:
+            raise NoSuchUpload("upload", upload.id, "send the file again: it was just deleted") from None
+
+
+def old_uploads(folder: Path, before: datetime) -> list[Path]:
+    """Folders of the uploads under `folder` that were whole before that time."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        try:
+            # The file's time, not its folder's: that is a new one when it comes from a backup.
+            if _ID.fullmatch(path.name) and (path / _ABOUT).stat().st_mtime < before.timestamp():
+                found.append(path)
+        except FileNotFoundError:  # its sender deletes it just now
+            continue
+    return found
+
+
+def remove_uploads(folders: Iterable[Path]) -> None:
+    """Delete uploads; what a job was made of them it has already."""
+    for folder in folders:
+        remove_folder(folder)
 
 
 def _of_json(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:

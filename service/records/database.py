@@ -15,6 +15,7 @@ from sdm_core.errors import InvalidInput
 # Raised when a table changes in a way that rows written before do not fit; columns are only ever added.
 SCHEMA_VERSION = 1
 FILE = "rubscreen.sqlite"
+RESTORING = ".restoring"  # below a data folder while a backup is unpacked into it
 _LOCK = 7_201_137  # any number, the same in every replica: PostgreSQL's advisory lock while tables are made
 
 METADATA = MetaData()
@@ -123,13 +124,16 @@ def open_database(data_folder: Path, url: str | None = None) -> Database:
     Raises
     ------
     InvalidInput
-        When the folder cannot be made, or the database cannot be used.
+        When the folder cannot be made or is being restored, or the database cannot be used.
     """
     try:
         data_folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         remedy = f"it cannot be made ({error.strerror}): give another folder"
         raise InvalidInput("data_folder", str(data_folder), remedy) from None
+    if (data_folder / RESTORING).exists():
+        remedy = "a restore into it did not finish: empty it, and restore again"
+        raise InvalidInput("data_folder", str(data_folder), remedy)
     return Database(database_url(url, data_folder))
 
 

@@ -186,10 +186,23 @@ class JobRecords:
         with self._database.begin() as connection:
             return [_job(row) for row in connection.execute(asked).mappings()]
 
-    def remove(self, job_id: str) -> None:
-        """Forget a job."""
+    def beginning(self, text: str) -> list[Job]:
+        """Jobs whose identifier begins with some hexadecimal digits, ten at most."""
+        asked = select(JOBS).where(JOBS.c.id.startswith(text, autoescape=True)).order_by(JOBS.c.id).limit(10)
         with self._database.begin() as connection:
-            connection.execute(JOBS.delete().where(JOBS.c.id == job_id))
+            return [_job(row) for row in connection.execute(asked).mappings()]
+
+    def remove_over(self, job_id: str, before: datetime) -> bool:
+        """Forget a job that was over before that time; whether it was."""
+        over = JOBS.c.state.in_([s.value for s in FINISHED]) & (JOBS.c.finished_at < before)
+        with self._database.begin() as connection:
+            return connection.execute(JOBS.delete().where(JOBS.c.id == job_id, over)).rowcount == 1
+
+    def known(self, job_ids: Sequence[str]) -> set[str]:
+        """Those of some identifiers that belong to jobs."""
+        asked = select(JOBS.c.id).where(JOBS.c.id.in_(job_ids))
+        with self._database.begin() as connection:
+            return set(connection.execute(asked).scalars())
 
     def active(self, owner: str | None = None) -> int:
         """Number of jobs not over, of one owner or of all."""

@@ -8,7 +8,9 @@ from pathlib import Path
 from sdm_core.errors import InvalidInput
 from service.jobs.engine import DaskEngine, Engine, Tls, checked_scheduler
 from service.jobs.job import SCREENING, TRAINING
+from service.jobs.job_folder import SCRATCH
 from service.jobs.jobs import Jobs, JobSettings, Kind
+from service.jobs.retention import Keep
 from service.jobs.screening.checks import limits_of
 from service.jobs.screening.kind import ScreeningKind
 from service.jobs.screening.watched import OnStored
@@ -17,8 +19,6 @@ from service.jobs.uploads import Uploads
 from service.records.database import Database
 from service.rest.accepting import train_when_due
 from service.settings import Settings
-
-SCRATCH = "scratch"
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,14 @@ class JobDesk:
         address = checked_scheduler(settings.scheduler, tls)
         engine = DaskEngine(address, settings.engine_workers, data_folder / SCRATCH, tls)
         kinds: dict[str, Kind] = {
-            SCREENING: ScreeningKind(engine, limits_of(settings), settings.min_free_bytes, on_stored),
+            SCREENING: ScreeningKind(
+                engine, limits_of(settings), settings.min_free_bytes, models_folder, on_stored
+            ),
             TRAINING: TrainingKind(models_folder, settings.served_answers_folder, settings.min_free_bytes),
         }
         at_once = {SCREENING: settings.jobs_at_once, TRAINING: 1} if settings.run_jobs else {}
-        how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes)
+        keep = Keep(settings.keep_jobs_days, settings.keep_uploads_days)
+        how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes, keep)
         jobs = Jobs(database, data_folder, kinds, how, train_when_due)
         uploads = Uploads(jobs.folders.uploads, settings.max_upload_bytes, settings.min_free_bytes)
         return cls(jobs, uploads, engine)

@@ -7,8 +7,7 @@ import shutil
 from pathlib import Path
 
 from service.settings import Settings
-from training.activation import FIRST, activate, active_id
-from training.registry import SHIPPED
+from training.activation import FIRST, SHIPPED, activate, active_id
 
 logger = logging.getLogger("rubscreen.service")
 

@@ -3,8 +3,8 @@
 No container engine is needed. Replayed to the letter: every COPY (nothing else of the repository is there),
 the `pip install` step, the command and the health check; as on the image, by a user without privileges whose
 home is empty. Not replayed: the base image (a new virtual environment of this Python stands for it, or of a
-copy of it where only root may run this one), the `useradd` (an existing user stands for the new one) and
-port 8000 (a free one, on the loopback only).
+copy of it where only root may run this one), the `useradd` (an existing user stands for the new one,
+and gets the data folder) and port 8000 (a free one, on the loopback only).
 
 The new environment sees the dependencies this one has, so that the install step installs the project, not
 torch once more; RUBSCREEN_FULL_INSTALL=1 leaves it empty and installs everything.
@@ -93,6 +93,14 @@ def _built(root: Path) -> Image:
             where.mkdir(parents=True, exist_ok=True)
         elif instruction == "COPY":
             _copy(text.split(), where)
+        elif instruction == "RUN" and "install -d -o" in text:
+            kept = root / text.rpartition(" ")[2].lstrip("/")
+            kept.mkdir(parents=True)
+            if user:
+                os.chown(kept, nobody.pw_uid, nobody.pw_gid)
+        elif instruction == "ENV":
+            name, _, value = text.partition("=")
+            image.environment[name] = str(root / value.lstrip("/")) if value.startswith("/") else value
         elif instruction == "RUN" and text.startswith("pip "):
             subprocess.run(["sh", "-c", text], cwd=where, env=environment, check=True)
     return image
@@ -176,7 +184,14 @@ def test_the_image_runs_without_privileges():
     assert argument("USER") not in ("root", "0")
     assert order.index("USER") < order.index("CMD")
     others = [text for name, text in steps() if name == "RUN" and not text.startswith("pip install ")]
-    assert [text.split()[0] for text in others] == ["useradd"]
+    assert [text.split()[0] for text in others] == ["apt-get", "useradd"]
+
+
+def test_what_the_image_keeps_is_in_a_volume_that_its_user_can_write():
+    kept = argument("VOLUME")
+    assert argument("ENV") == f"RUBSCREEN_DATA_FOLDER={kept}"
+    made = next(text for name, text in steps() if name == "RUN" and text.startswith("useradd"))
+    assert made.endswith(f"install -d -o {argument('USER')} {kept}")
 
 
 def test_everything_the_image_copies_gets_past_the_ignore_file():
@@ -203,6 +218,26 @@ def test_the_command_of_the_image_gets_ready_and_answers(service):
     answer = httpx.post(f"http://127.0.0.1:{port}/v1/stability", json=POINTS_EXAMPLE, timeout=60.0)
     assert answer.status_code == 200
     assert None not in answer.json()["stable"]
+
+
+def test_it_starts_for_others_only_when_there_is_a_key_and_says_how_to_make_one(image, tmp_path):
+    asked = {
+        "env": image.environment | {"RUBSCREEN_AUTH": "on", "RUBSCREEN_DATA_FOLDER": str(image.home / "keys")}
+    }
+    command = [{"0.0.0.0": "127.0.0.1", "8000": "0"}.get(word, word) for word in json.loads(argument("CMD"))]
+    refused = image.run(command, stderr=subprocess.PIPE, **asked)
+    assert "rubscreen keys create" in refused.communicate(timeout=60)[1]
+    assert refused.returncode == 2
+    made = image.run(
+        ["rubscreen", "keys", "create", "office", "--role", "submit"], stdout=subprocess.PIPE, **asked
+    )
+    assert made.communicate(timeout=60)[0].startswith("rub_")
+    running = image.run(command, stdout=subprocess.PIPE, **asked)
+    try:
+        assert "listening on" in running.stdout.readline()
+    finally:
+        running.kill()
+        running.wait()
 
 
 def test_the_health_check_passes_while_the_service_runs_and_fails_after_it_stops(image, service):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import RubscreenError
@@ -52,6 +53,9 @@ class ScreeningKind:
         Settings that bound what the exact core is asked (`service.rest.limits.check_reach`).
     reserve_bytes
         Room to leave on the disk.
+    models_folder
+        Where the models are now: not always where they were when the job was accepted, for the data may have
+        moved. None takes the request's word.
     on_stored
         Told of every chunk, once it is stored.
     """
@@ -61,10 +65,11 @@ class ScreeningKind:
         engine: Engine,
         limits: Mapping[str, Any],
         reserve_bytes: int,
+        models_folder: Path | None = None,
         on_stored: OnStored = lambda content: None,
     ) -> None:
         self._engine, self._limits, self._reserve = engine, dict(limits), reserve_bytes
-        self._on_stored = on_stored
+        self._models, self._on_stored = models_folder, on_stored
 
     def run(self, folder: JobFolder, control: Control) -> None:
         """Compute what is not stored, then write the ranking.
@@ -79,6 +84,8 @@ class ScreeningKind:
             As `Control.check`.
         """
         asked = folder.request()
+        if self._models is not None:
+            asked["models_folder"] = str(self._models.resolve())
         request = ScreeningRequest.from_dict(asked)
         store = ChunkStore(folder.chunks)
         control.report(stage="looking at what is stored", now=True)
