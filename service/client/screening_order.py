@@ -148,7 +148,7 @@ def _body_too_long(problem: ServiceProblem) -> bool:
 
 
 def _placed(problem: ServiceProblem, firsts: Sequence[int]) -> ServiceProblem:
-    """A refusal that names a line of a piece, or an entry as sent, as one that names the entry of `blades`."""
+    """A refusal that names a line of a piece, or an entry as sent, as one that names that of `blades`."""
     field = str(problem.problem.get("field", ""))
     line, entry = _OF_PIECE.match(field), _OF_ORDER.match(field)
     if line is not None:

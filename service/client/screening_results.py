@@ -145,6 +145,17 @@ class ScreeningResults:
 
         return tuple(NotScreened(**vars(blade)) for blade in unscreened_of(self.table))
 
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON, rows as the service writes them."""
+        from service.jobs.screening.results import to_rows
+
+        return {
+            "job": self.job,
+            "complete": self.complete,
+            "results": to_rows(self.table),
+            "not_screened": [vars(blade) for blade in self.not_screened],
+        }
+
     def to_csv(self, path: str | Path | None = None) -> bytes:
         """The table as CSV, as the service writes it; into a file too where one is named."""
         from service.jobs.screening.results import to_csv
