@@ -65,8 +65,21 @@ class Message:
     @classmethod
     def order(cls, path: str, document: Json, key: str | None = None) -> Message:
         """A body that is to be acted on once: its Idempotency-Key stays the same however often it is sent."""
-        headers = {"Idempotency-Key": key or str(uuid.uuid4())}
-        return cls("POST", path, replies.to_json(document), headers=headers)
+        return cls("POST", path, replies.to_json(document), headers=once(key))
+
+
+def once(key: str | None) -> dict[str, str]:
+    """The header that makes an order sent twice one job; None makes a key.
+
+    Raises
+    ------
+    InvalidInput
+        For a key that no header can carry.
+    """
+    key = str(uuid.uuid4()) if key is None else key
+    if not (key.isascii() and key.isprintable() and key.strip() == key != ""):
+        raise InvalidInput("idempotency_key", key, "give 1 to 200 visible ASCII characters, e.g. a UUID")
+    return {"Idempotency-Key": key}
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, cast
@@ -14,7 +13,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from service.client.job_conversations import SCREENINGS, status_of
 from service.client.job_status import JobStatus
-from service.client.message import Conversation, Message
+from service.client.message import Conversation, Message, once
 from service.client.problem import ServiceProblem
 from service.client.uploading import LINES, BladeLike, Entry, entry_of, send
 from service.jobs.screening.request import Criteria
@@ -72,7 +71,7 @@ def submitted(
     ServiceProblem
         With the place in `blades` of what was refused, whichever way it went.
     """
-    headers = {"Idempotency-Key": key or str(uuid.uuid4())}
+    headers = once(key)
     coming = _entries(blades)
     held, size = [], 0
     for entry in coming:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from typing import Any
 
 from service.client.conversations import one
@@ -18,7 +17,7 @@ SCHEDULE = f"{TRAININGS}/schedule"
 
 def submitted(training: TrainingQuestion | None, key: str | None) -> Conversation[JobStatus]:
     """``POST /v1/trainings``, once for a key however often it is sent."""
-    return status_of(Message.order(TRAININGS, _asked(training), key or str(uuid.uuid4())))
+    return status_of(Message.order(TRAININGS, _asked(training), key))
 
 
 def result(job_id: str) -> Conversation[TrainedReply]:
