@@ -12,6 +12,7 @@ from sdm_core.version import __version__
 from service.commands import (
     assess,
     backup,
+    batch,
     blade,
     boundary,
     demo,
@@ -25,6 +26,7 @@ from service.commands import (
     sensitivities,
     serve,
     train,
+    trainings,
 )
 
 
@@ -75,7 +77,9 @@ for command in (demo, serve, screen, assess, map, boundary, sensitivities, train
     app.command(command.__name__.rpartition(".")[2])(command.run)
 
 app.add_typer(blade.app, name="blade")
+app.add_typer(batch.app, name="batch")
 app.add_typer(models.app, name="models")
+app.add_typer(trainings.app, name="trainings")
 app.add_typer(keys.app, name="keys")
 app.add_typer(jobs.app, name="jobs")
 

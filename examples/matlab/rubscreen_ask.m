@@ -1,7 +1,7 @@
 function answer = rubscreen_ask(url, path, question, key)
 % Ask a running rubscreen service: answer = rubscreen_ask('http://127.0.0.1:8000', '/v1/stability', question)
 %
-% question   JSON text (see rubscreen_points.m), sent as it is
+% question   JSON text (see rubscreen_points.m), sent as it is; '' only looks (GET), as in rubscreen_batch.m
 % key        API key, for a service that asks for one; left out, that of RUBSCREEN_API_KEY
 % answer     struct; null is empty or NaN, as jsondecode has it
 %
@@ -26,9 +26,14 @@ function [status, text] = by_matlab(address, question, key)
   if ~isempty(key)
     header(end+1) = matlab.net.http.HeaderField('Authorization', ['Bearer ' strtrim(key)]);
   end
-  body = matlab.net.http.MessageBody();
-  body.Payload = unicode2native(question, 'UTF-8');
-  request = matlab.net.http.RequestMessage('POST', header, body);
+  if isempty(question)
+    request = matlab.net.http.RequestMessage('GET', header(2:end));
+  else
+    header(end+1) = matlab.net.http.HeaderField('Idempotency-Key', order_key());
+    body = matlab.net.http.MessageBody();
+    body.Payload = unicode2native(question, 'UTF-8');
+    request = matlab.net.http.RequestMessage('POST', header, body);
+  end
   % Not converted, so that answers and problem documents are decoded alike.
   options = matlab.net.http.HTTPOptions('ConvertResponse', false, 'ResponseTimeout', 300);
   response = request.send(address, options);
@@ -40,15 +45,24 @@ function [status, text] = by_curl(address, question, key)
   asked = [tempname() '.json'];
   file = fopen(asked, 'w'); fwrite(file, question); fclose(file);
   headers = [tempname() '.txt'];  % a key among the arguments could be seen by others on the machine
-  file = fopen(headers, 'w'); fprintf(file, 'Content-Type: application/json\n');
+  file = fopen(headers, 'w'); fprintf(file, 'Accept: application/json\n');
+  if ~isempty(question), fprintf(file, 'Content-Type: application/json\nIdempotency-Key: %s\n', order_key()); end
   if ~isempty(key), fprintf(file, 'Authorization: Bearer %s\n', strtrim(key)); end
   fclose(file);
   clean = onCleanup(@() cellfun(@delete, {asked, headers}));
-  command = sprintf('curl --silent --show-error --retry 5 --max-time 300 --header "@%s" --data-binary "@%s" --write-out "\\n%%{http_code}" "%s"', ...
-                    headers, asked, address);
+  body = '';
+  if ~isempty(question), body = sprintf('--data-binary "@%s"', asked); end
+  command = sprintf('curl --silent --show-error --retry 5 --max-time 300 --header "@%s" %s --write-out "\\n%%{http_code}" "%s"', ...
+                    headers, body, address);
   [failed, said] = system(command);
   if failed, error('rubscreen:unreachable', 'no answer from %s', address); end
   lines = strsplit(said, "\n");
   status = str2double(lines{end});
   text = strjoin(lines(1:end-1), "\n");
+end
+
+function key = order_key()
+% What makes a job that is sent twice, because its answer was lost, one job; other calls do without.
+  [~, unique] = fileparts(tempname());
+  key = sprintf('%s-%.0f', unique, now() * 86400e3);
 end

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
+from contextlib import aclosing
+from threading import BoundedSemaphore
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import httpx
 import numpy as np
 import tenacity
+from httpx_sse import EventSource
 
 from sdm_core.blade import Blade
 from sdm_core.blade.profile import BladeProfile
 from sdm_core.contact import ContactConfiguration
 from service.client import conversations, model_conversations
+from service.client.async_jobs import AsyncClientOfJobs
 from service.client.conversations import BladeAnswer, Progress, numbers
-from service.client.message import Address, Conversation, Message, checked
+from service.client.message import (
+    MOST_STREAMS,
+    Address,
+    Conversation,
+    Listening,
+    Message,
+    Pause,
+    Step,
+    checked,
+)
 from service.client.patience import Patience
 from service.client.problem import ServiceProblem
 from service.client.questions import Boundary, Map, Points, Sensitivities
@@ -26,7 +40,7 @@ from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, Sensitiv
 T = TypeVar("T")
 
 
-class AsyncClient:
+class AsyncClient(AsyncClientOfJobs):
     """As `Client`, parameter by parameter and method by method; an asynchronous context manager.
 
     Several questions may be awaited at the same time.
@@ -51,6 +65,7 @@ class AsyncClient:
     ) -> None:
         self._address = Address.of(base_url, key)
         self._patience = patience
+        self._streams = BoundedSemaphore(MOST_STREAMS)
         self._http = http or httpx.AsyncClient(timeout=timeout)
 
     @property
@@ -164,26 +179,58 @@ class AsyncClient:
         """Whether the service answers questions now; as `Client.ready`."""
         return await self.run(conversations.ready())
 
-    async def run(self, conversation: Conversation[T]) -> T:
+    async def run(self, conversation: Conversation[T], *, within_s: float | None = None) -> T:
         """The outcome of a conversation with the service.
+
+        Parameters
+        ----------
+        within_s
+            Time for all of it; None is `total_s` of the patience.
 
         Raises
         ------
         ServiceProblem
             What it did not expect.
         """
-        end = time.monotonic() + self._patience.total_s
+        end = time.monotonic() + (self._patience.total_s if within_s is None else within_s)
         try:
-            message = next(conversation)
+            step = next(conversation)
             while True:
                 try:
-                    reply = await self._answered(message, end)
+                    reply = await self._taken(step, end)
                 except ServiceProblem as problem:
-                    message = conversation.throw(problem)
+                    step = conversation.throw(problem)
                 else:
-                    message = conversation.send(reply)
+                    step = conversation.send(reply)
         except StopIteration as finished:
             return finished.value
+
+    async def _taken(self, step: Step, end: float) -> httpx.Response | None:
+        if isinstance(step, Message):
+            return await self._answered(step, end)
+        if isinstance(step, Pause):
+            await asyncio.sleep(step.seconds)
+        elif not self._streams.acquire(blocking=False):
+            raise ServiceProblem.crowded(self.base_url)
+        else:
+            try:
+                await self._heard(step)
+            finally:
+                self._streams.release()
+        return None
+
+    async def _heard(self, step: Listening) -> None:
+        try:
+            async with self._http.stream(**self._address.listening(step)) as response:
+                if not response.is_success:
+                    await response.aread()
+                checked(response)
+                async with aclosing(EventSource(response).aiter_sse()) as events:
+                    async for event in events:
+                        if step.hear(event.data):
+                            return
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise ServiceProblem.unreachable(self.base_url, error) from None
 
     async def _answered(self, message: Message, end: float) -> httpx.Response:
         options = self._patience.options(message, end - time.monotonic(), self.base_url)
@@ -191,6 +238,6 @@ class AsyncClient:
 
     async def _sent(self, message: Message) -> httpx.Response:
         try:
-            return checked(await self._http.request(**self._address.request(message)))
+            return checked(await self._http.request(**self._address.request(message, awaited=True)))
         except (httpx.HTTPError, httpx.InvalidURL) as error:
             raise ServiceProblem.unreachable(self.base_url, error) from None

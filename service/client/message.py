@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ import orjson
 
 from sdm_core.errors import InvalidInput
 from sdm_core.version import __version__
+from service.client.file_body import FileBody
 from service.client.problem import ServiceProblem
 from service.rest import replies
 from service.rest.forms.media_types import JSON
@@ -20,6 +21,11 @@ from service.rest.forms.media_types import JSON
 Json = dict[str, Any]
 T = TypeVar("T")
 KEY_VARIABLE = "RUBSCREEN_API_KEY"
+EVENTS = "text/event-stream"
+# Streams that one client listens to: each counts among the requests its key may have at the same time, 32 by
+# default. Further jobs are asked for every few seconds.
+MOST_STREAMS = 8
+_CONNECT_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,8 @@ class Message:
 
     Attributes
     ----------
+    content
+        The body; a file is read while it is sent, and anew each time it is.
     form, accept
         Media types of the body and of the answer.
     headers
@@ -38,7 +46,7 @@ class Message:
 
     method: str
     path: str
-    content: bytes | None = None
+    content: bytes | FileBody | None = None
     form: str = JSON
     accept: str = JSON
     headers: Mapping[str, str] = field(default_factory=dict)
@@ -57,12 +65,50 @@ class Message:
     @classmethod
     def order(cls, path: str, document: Json, key: str | None = None) -> Message:
         """A body that is to be acted on once: its Idempotency-Key stays the same however often it is sent."""
-        headers = {"Idempotency-Key": key or str(uuid.uuid4())}
-        return cls("POST", path, replies.to_json(document), headers=headers)
+        return cls("POST", path, replies.to_json(document), headers=once(key))
 
 
-Conversation = Generator[Message, httpx.Response, T]
-"""Yields messages and is sent their answers, or thrown the `ServiceProblem`; returns the outcome."""
+def once(key: str | None) -> dict[str, str]:
+    """The header that makes an order sent twice one job; None makes a key.
+
+    Raises
+    ------
+    InvalidInput
+        For a key that no header can carry.
+    """
+    key = str(uuid.uuid4()) if key is None else key
+    if not (key.isascii() and key.isprintable() and key.strip() == key != ""):
+        raise InvalidInput("idempotency_key", key, "give 1 to 200 visible ASCII characters, e.g. a UUID")
+    return {"Idempotency-Key": key}
+
+
+@dataclass(frozen=True)
+class Listening:
+    """A stream of server-sent events, listened to until it ends.
+
+    Attributes
+    ----------
+    hear
+        Told the data of each event; says whether that is enough.
+    silent_s
+        Time without a byte after which the stream is taken for dead, s.
+    """
+
+    path: str
+    hear: Callable[[str], bool]
+    silent_s: float
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Time in which nothing is sent, s."""
+
+    seconds: float
+
+
+Step = Message | Listening | Pause
+Conversation = Generator[Step, Any, T]
+"""Yields steps; is sent the response to a message, or thrown a `ServiceProblem`; returns the outcome."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +138,13 @@ class Address:
         given = os.environ.get(KEY_VARIABLE) if key is None else key
         return cls(base_url.rstrip("/"), (given or "").strip() or None)
 
-    def request(self, message: Message) -> Json:
-        """Arguments of the HTTP client's `request`."""
+    def listening(self, step: Listening) -> Json:
+        """Arguments of the HTTP client's `stream`."""
+        asked = self.request(Message("GET", step.path, accept=EVENTS))
+        return asked | {"timeout": httpx.Timeout(_CONNECT_S, read=step.silent_s)}
+
+    def request(self, message: Message, *, awaited: bool = False) -> Json:
+        """Arguments of the HTTP client's `request`; `awaited` for the asynchronous one."""
         headers = {
             "Accept": message.accept,
             "User-Agent": f"rubscreen/{__version__}",
@@ -103,10 +154,14 @@ class Address:
             headers["Content-Type"] = message.form
         if self.key is not None:
             headers["Authorization"] = f"Bearer {self.key}"
+        content: Any = message.content
+        if isinstance(content, FileBody):
+            headers["Content-Length"] = str(content.size)
+            content = content.parts_awaited() if awaited else content.parts()
         return {
             "method": message.method,
             "url": self.base_url + message.path,
-            "content": message.content,
+            "content": content,
             "headers": headers,
         }
 

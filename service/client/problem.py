@@ -63,6 +63,12 @@ class ServiceProblem(RubscreenError):
         return cls(document, isinstance(error, _PASSING))
 
     @classmethod
+    def crowded(cls, base_url: str) -> ServiceProblem:
+        """When this client listens to as many streams as it may."""
+        detail = f"{base_url}: this client listens to enough jobs already"
+        return cls({"status": None, "title": "No further stream", "detail": detail}, temporary=True)
+
+    @classmethod
     def too_late(cls, base_url: str, total_s: float) -> ServiceProblem:
         """When the time for the whole call is up."""
         detail = f"{base_url}: not answered within {total_s:g} s; ask for less, or allow more"

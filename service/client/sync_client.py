@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import time
+from threading import BoundedSemaphore
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import httpx
 import numpy as np
 import tenacity
+from httpx_sse import EventSource
 
 from sdm_core.blade import Blade
 from sdm_core.blade.profile import BladeProfile
 from sdm_core.contact import ContactConfiguration
 from service.client import conversations, model_conversations
 from service.client.conversations import BladeAnswer, Progress, numbers
-from service.client.message import Address, Conversation, Message, checked
+from service.client.message import (
+    MOST_STREAMS,
+    Address,
+    Conversation,
+    Listening,
+    Message,
+    Pause,
+    Step,
+    checked,
+)
 from service.client.patience import Patience
 from service.client.problem import ServiceProblem
 from service.client.questions import Boundary, Map, Points, Sensitivities
+from service.client.sync_jobs import ClientOfJobs
 from service.rest.model_schemas import ModelChange, ModelHistory
 from service.rest.schemas import Model
 from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, SensitivityAnswers
@@ -26,7 +38,7 @@ from training.answers import BoundaryAnswers, MapAnswers, PointAnswers, Sensitiv
 T = TypeVar("T")
 
 
-class Client:
+class Client(ClientOfJobs):
     """Asks a running service, and answers like a `training.screening.Screener`; a context manager.
 
     Large questions are sent as npz and in parts, and put together again. A request that could not be
@@ -63,6 +75,7 @@ class Client:
     ) -> None:
         self._address = Address.of(base_url, key)
         self._patience = patience
+        self._streams = BoundedSemaphore(MOST_STREAMS)
         self._http = http or httpx.Client(timeout=timeout)
 
     @property
@@ -187,26 +200,57 @@ class Client:
         """Whether the service answers questions now (``GET /readyz``)."""
         return self.run(conversations.ready())
 
-    def run(self, conversation: Conversation[T]) -> T:
+    def run(self, conversation: Conversation[T], *, within_s: float | None = None) -> T:
         """The outcome of a conversation with the service.
+
+        Parameters
+        ----------
+        within_s
+            Time for all of it; None is `total_s` of the patience.
 
         Raises
         ------
         ServiceProblem
             What it did not expect.
         """
-        end = time.monotonic() + self._patience.total_s
+        end = time.monotonic() + (self._patience.total_s if within_s is None else within_s)
         try:
-            message = next(conversation)
+            step = next(conversation)
             while True:
                 try:
-                    reply = self._answered(message, end)
+                    reply = self._taken(step, end)
                 except ServiceProblem as problem:
-                    message = conversation.throw(problem)
+                    step = conversation.throw(problem)
                 else:
-                    message = conversation.send(reply)
+                    step = conversation.send(reply)
         except StopIteration as finished:
             return finished.value
+
+    def _taken(self, step: Step, end: float) -> httpx.Response | None:
+        if isinstance(step, Message):
+            return self._answered(step, end)
+        if isinstance(step, Pause):
+            time.sleep(step.seconds)
+        elif not self._streams.acquire(blocking=False):
+            raise ServiceProblem.crowded(self.base_url)
+        else:
+            try:
+                self._heard(step)
+            finally:
+                self._streams.release()
+        return None
+
+    def _heard(self, step: Listening) -> None:
+        try:
+            with self._http.stream(**self._address.listening(step)) as response:
+                if not response.is_success:
+                    response.read()
+                checked(response)
+                for event in EventSource(response).iter_sse():
+                    if step.hear(event.data):
+                        return
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise ServiceProblem.unreachable(self.base_url, error) from None
 
     def _answered(self, message: Message, end: float) -> httpx.Response:
         options = self._patience.options(message, end - time.monotonic(), self.base_url)

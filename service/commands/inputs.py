@@ -69,6 +69,24 @@ def _contact(weights: dict[str, float], arcs: str | None, engagement: str | None
     )
 
 
+def named_contacts(
+    nodes: Sequence[str], weights: Sequence[str], arcs: str | None, engagement: str | None
+) -> dict[str, ContactConfiguration]:
+    """The contacts of one for each --nodes and --weights, by what was typed; not the weights of `CHORD`.
+
+    Raises
+    ------
+    InvalidInput
+        For what is wrong with the text.
+    """
+    if not nodes and not weights:
+        for option, given in (("--arcs", arcs), ("--engagement", engagement)):
+            if given is not None:
+                raise InvalidInput(option, given, "say which nodes too, e.g. --nodes LE --nodes TE")
+    same = {text: _contact(_unit_weights(text), arcs, engagement) for text in nodes}
+    return same | {text: _contact(_weights(text), arcs, engagement) for text in weights if text != CHORD}
+
+
 def contacts_from(
     nodes: Sequence[str], weights: Sequence[str], arcs: str | None, engagement: str | None
 ) -> Callable[[Blade], dict[str, ContactConfiguration]]:
@@ -79,13 +97,9 @@ def contacts_from(
     """
     from service.screening.screen import default_contacts
 
+    same = named_contacts(nodes, weights, arcs, engagement)
     if not nodes and not weights:
-        for option, given in (("--arcs", arcs), ("--engagement", engagement)):
-            if given is not None:
-                raise InvalidInput(option, given, "say which nodes too, e.g. --nodes LE --nodes TE")
         return default_contacts
-    same = {text: _contact(_unit_weights(text), arcs, engagement) for text in nodes}
-    same |= {text: _contact(_weights(text), arcs, engagement) for text in weights if text != CHORD}
 
     def of_blade(blade: Blade) -> dict[str, ContactConfiguration]:
         named = dict(same)

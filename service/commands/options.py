@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 CONTACT, OUTPUT, ANSWERS = "Contact", "Output", "Where answers come from"
+LOCAL_SERVICE = "http://127.0.0.1:8000"
 
 
 class Policy(StrEnum):
@@ -103,6 +104,12 @@ UrlOption = Annotated[
         show_default=False,
     ),
 ]
+ServiceOption = Annotated[
+    str,
+    typer.Option(
+        "--url", metavar="URL", envvar="RUBSCREEN_URL", help="The running service.", rich_help_panel=ANSWERS
+    ),
+]
 ModelsOption = Annotated[
     str | None,
     typer.Option(
@@ -136,6 +143,22 @@ JsonOption = Annotated[
     str | None,
     typer.Option(
         "--json", metavar="PATH", help="Write JSON; - for stdout.", rich_help_panel=OUTPUT, show_default=False
+    ),
+]
+CsvOption = Annotated[
+    str | None,
+    typer.Option(
+        "--csv", metavar="PATH", help="Write the table as CSV.", rich_help_panel=OUTPUT, show_default=False
+    ),
+]
+ParquetOption = Annotated[
+    str | None,
+    typer.Option(
+        "--parquet",
+        metavar="PATH",
+        help="Write the table as Parquet.",
+        rich_help_panel=OUTPUT,
+        show_default=False,
     ),
 ]
 NpzOption = Annotated[

@@ -35,7 +35,7 @@ class Upload:
     Attributes
     ----------
     id
-        32 hexadecimal digits.
+        32 hexadecimal digits, made of all the rest: the same file sent again by the same key is the same one.
     name
         As its sender calls it: only ever shown.
     form
@@ -55,9 +55,9 @@ class Upload:
 class UploadWriter:
     """A file that is arriving."""
 
-    def __init__(self, folder: Path, upload_id: str, most_bytes: int) -> None:
-        self._folder, self._id, self._most = folder, upload_id, most_bytes
-        self._beside = folder / f"{INCOMING}{upload_id}"
+    def __init__(self, folder: Path, most_bytes: int) -> None:
+        self._folder, self._most = folder, most_bytes
+        self._beside = folder / f"{INCOMING}{uuid.uuid4().hex}"
         self._beside.mkdir(parents=True)
         self._file = (self._beside / _CONTENT).open("xb")
         self._digest, self._size = hashlib.sha256(), 0
@@ -79,7 +79,7 @@ class UploadWriter:
         self._file.write(part)
 
     def finish(self, name: str, form: str, owner: str | None) -> Upload:
-        """All of it has come: it is on the disk when this returns.
+        """All of it has come: it is on the disk when this returns, once however often it was sent.
 
         Raises
         ------
@@ -88,9 +88,18 @@ class UploadWriter:
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
-        upload = Upload(self._id, name, form, self._size, self._digest.hexdigest(), owner)
+        digest = self._digest.hexdigest()
+        told = json.dumps([name, form, self._size, digest, owner])
+        upload = Upload(hashlib.sha256(told.encode()).hexdigest()[:32], name, form, self._size, digest, owner)
         write_durably(self._beside / _ABOUT, json.dumps(asdict(upload)).encode())
-        os.replace(self._beside, self._folder / self._id)
+        place = self._folder / upload.id
+        try:
+            os.replace(self._beside, place)
+        except OSError:
+            if not (place / _ABOUT).is_file():
+                raise
+            os.utime(place)  # sent before, and counted as sent now
+            remove_folder(self._beside)
         sync_folder(self._folder)
         return upload
 
@@ -125,7 +134,7 @@ class Uploads:
             remedy = f"send at most {self._most} bytes: split the file"
             raise UploadTooLarge("body", f"{announced_bytes} bytes", remedy)
         check_room(self._folder, announced_bytes, self._reserve)
-        return UploadWriter(self._folder, uuid.uuid4().hex, self._most)
+        return UploadWriter(self._folder, self._most)
 
     def get(self, upload_id: str, owner: str | None) -> Upload:
         """A file of this owner; None may see every one's.

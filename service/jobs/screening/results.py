@@ -127,10 +127,15 @@ def results(folder: JobFolder) -> tuple[pa.Table, list[UnscreenedBlade], bool]:
             raise DamagedFile(
                 "results", str(path), f"retry the job, which writes it again ({error})"
             ) from None
-        said = json.loads((table.schema.metadata or {}).get(_UNSCREENED, b"[]"))
-        return table, [UnscreenedBlade(**entry) for entry in said], True
+        return table, unscreened_of(table), True
     rows, unscreened = stored_rows(folder)
     return ranked(rows, ScreeningRequest.from_dict(folder.request()).criteria), unscreened, False
+
+
+def unscreened_of(table: pa.Table) -> list[UnscreenedBlade]:
+    """The blades not screened, in the metadata of a table read from Parquet."""
+    said = json.loads((table.schema.metadata or {}).get(_UNSCREENED, b"[]"))
+    return [UnscreenedBlade(**entry) for entry in said]
 
 
 def to_parquet(table: pa.Table, unscreened: Sequence[UnscreenedBlade]) -> bytes:

@@ -85,7 +85,7 @@ def check_owner(job: Job, caller: Caller) -> None:
 
 
 def progress_events(request: Request, desk: JobDesk, job: Job) -> StreamingResponse:
-    """The job as server-sent events: at once, at every change, and when it is over."""
+    """The job as server-sent events: at once, at every change, now and then without, and when it is over."""
     closing = the_desk(request).closing
 
     async def events() -> AsyncIterator[bytes]:
@@ -104,8 +104,7 @@ def progress_events(request: Request, desk: JobDesk, job: Job) -> StreamingRespo
             await asyncio.sleep(_LOOK_EVERY_S)
             silent_s += _LOOK_EVERY_S
             if silent_s >= _STILL_THERE_S:  # or a proxy takes the connection for dead
-                silent_s = 0.0
-                yield b": still there\n\n"
+                said = None
 
     headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
     return StreamingResponse(events(), media_type="text/event-stream", headers=headers)
