@@ -58,10 +58,11 @@ class Old:
     jobs
         Over before `moment`.
     uploads
-        Folders of files sent ahead.
+        Folders of files sent ahead before `uploads_moment`.
     """
 
     moment: datetime
+    uploads_moment: datetime
     jobs: tuple[Job, ...]
     uploads: tuple[Path, ...]
 
@@ -95,12 +96,12 @@ class Retention:
     def old(self, keep: Keep, now: datetime | None = None) -> Old:
         """What would be deleted."""
         now = now or datetime.now(UTC)
-        moment = now - timedelta(days=keep.jobs_days)
+        moment, uploads_moment = (now - timedelta(days=days) for days in (keep.jobs_days, keep.uploads_days))
         jobs = tuple(self._records.finished_before(moment)) if keep.jobs_days else ()
         uploads: tuple[Path, ...] = ()
         if keep.uploads_days:
-            uploads = tuple(old_uploads(self._folders.uploads, now - timedelta(days=keep.uploads_days)))
-        return Old(moment, jobs, uploads)
+            uploads = tuple(old_uploads(self._folders.uploads, uploads_moment))
+        return Old(moment, uploads_moment, jobs, uploads)
 
     def delete(self, old: Old, go_on: Callable[[], bool] = lambda: True) -> Iterator[Job]:
         """Delete what `old` names, uploads first; each job that went.
@@ -110,7 +111,7 @@ class Retention:
         go_on
             Asked before each job.
         """
-        remove_uploads(old.uploads)
+        remove_uploads(old.uploads, old.uploads_moment)
         for job in old.jobs:
             if not go_on():
                 return

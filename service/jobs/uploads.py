@@ -94,11 +94,15 @@ class UploadWriter:
         write_durably(self._beside / _ABOUT, json.dumps(asdict(upload)).encode())
         place = self._folder / upload.id
         try:
-            os.replace(self._beside, place)
-        except OSError:
-            if not (place / _ABOUT).is_file():
-                raise
-            os.utime(place)  # sent before, and counted as sent now
+            os.utime(place / _ABOUT)  # sent before, and kept as if sent now (`old_uploads`)
+        except FileNotFoundError:
+            try:
+                os.replace(self._beside, place)
+            except OSError:
+                if not (place / _ABOUT).is_file():  # nor is the same file just arriving a second time
+                    raise
+                remove_folder(self._beside)
+        else:
             remove_folder(self._beside)
         sync_folder(self._folder)
         return upload
@@ -183,21 +187,24 @@ class Uploads:
 
 def old_uploads(folder: Path, before: datetime) -> list[Path]:
     """Folders of the uploads under `folder` that were whole before that time."""
-    found = []
-    for path in sorted(folder.iterdir()):
-        try:
-            # The file's time, not its folder's: that is a new one when it comes from a backup.
-            if _ID.fullmatch(path.name) and (path / _ABOUT).stat().st_mtime < before.timestamp():
-                found.append(path)
-        except FileNotFoundError:  # its sender deletes it just now
-            continue
-    return found
+    return [
+        path for path in sorted(folder.iterdir()) if _ID.fullmatch(path.name) and _came_before(path, before)
+    ]
 
 
-def remove_uploads(folders: Iterable[Path]) -> None:
-    """Delete uploads; what a job was made of them it has already."""
+def remove_uploads(folders: Iterable[Path], before: datetime) -> None:
+    """Delete uploads that were not sent again since; what a job was made of them it has already."""
     for folder in folders:
-        remove_folder(folder)
+        if _came_before(folder, before):
+            remove_folder(folder)
+
+
+def _came_before(upload: Path, before: datetime) -> bool:
+    try:
+        # The file's time, not its folder's: that is a new one when it comes from a backup.
+        return (upload / _ABOUT).stat().st_mtime < before.timestamp()
+    except FileNotFoundError:  # its sender deletes it just now
+        return False
 
 
 def _of_json(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:

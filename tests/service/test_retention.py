@@ -55,9 +55,9 @@ class Office:
         self.folders.unmark(job.id)
         return job
 
-    def upload(self, age: timedelta) -> str:
+    def upload(self, age: timedelta, content: bytes | None = None) -> str:
         writer = Uploads(self.folders.uploads, 10**6, 0).begin()
-        writer.write(b"{}")
+        writer.write(content or uuid.uuid4().bytes)
         upload = writer.finish("blades.json", JSON, None)
         about = self.folders.uploads / upload.id / "about.json"
         os.utime(about, ((NOW - age).timestamp(),) * 2)
@@ -121,6 +121,19 @@ def test_a_job_that_is_retried_just_before_it_would_go_is_kept_whole(office):
     assert list(office.retention.delete(old)) == []
     assert office.records.get(job.id).state is State.QUEUED
     assert office.files() == files
+
+
+def test_a_file_that_is_sent_again_is_kept_from_then_on(office):
+    sent = office.upload(8 * DAY, b"[]")
+    old = office.retention.old(Keep(0.0, 7.0), NOW)
+    assert [path.name for path in old.uploads] == [sent]
+    assert Uploads(office.folders.uploads, 10**6, 0).get(sent, None).id == sent
+    writer = Uploads(office.folders.uploads, 10**6, 0).begin()
+    writer.write(b"[]")
+    assert writer.finish("blades.json", JSON, None).id == sent
+    list(office.retention.delete(old))
+    assert office.prune(uploads_days=7.0) == set()
+    assert [path.name for path in office.folders.uploads.iterdir()] == [sent]
 
 
 class Killed(BaseException):
