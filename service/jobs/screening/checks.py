@@ -16,7 +16,7 @@ from service.sizes import TooLarge, check_blade_size, check_length, check_reach
 from service.speeds import evenly_spaced
 
 # Seconds one blade takes, rotor 37 on one core: what makes chunks alike in length, and no promise.
-PERMANENT_S, ARCS_S, SMOOTH_S, PROFILE_S = 0.15, 6.0, 30.0, 3.0
+PERMANENT_S, ARCS_S, SMOOTH_S, PROFILE_S = 0.15, 25.0, 30.0, 3.0
 CHUNK_S, MOST_PER_CHUNK = 4.0, 32
 
 
