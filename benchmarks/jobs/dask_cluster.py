@@ -13,7 +13,9 @@ from types import TracebackType
 from typing import Self
 
 _ADDRESS = re.compile(r"Scheduler at:\s+((?:tcp|tls)://\S+)")
-_ALONE = ("--nthreads", "1", "--nworkers", "1", "--no-dashboard")
+# Without a dashboard too dask serves pages, and on every address unless it is told one.
+_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
+_ALONE = ("--nthreads", "1", "--nworkers", "1", *_PAGES)
 
 
 class DaskCluster:
@@ -28,7 +30,7 @@ class DaskCluster:
     def __init__(self, scratch: Path, count: int = 3, tls: tuple[str, ...] = ()) -> None:
         self._said: deque[str] = deque(maxlen=500)
         here = ("--host", "127.0.0.1")
-        self._scheduler = self._start("dask_scheduler", *here, "--port", "0", "--no-dashboard", *tls)
+        self._scheduler = self._start("dask_scheduler", *here, "--port", "0", *_PAGES, *tls)
         self.address = self._found_address()
         where = (self.address, *here, "--no-nanny", *_ALONE, "--local-directory", str(scratch), *tls)
         self.workers = [self._start("dask_worker", *where) for _ in range(count)]

@@ -176,7 +176,7 @@ class DaskEngine:
                     threads_per_worker=1,
                     processes=True,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",
                     local_directory=str(self._scratch),
                     silence_logs=logging.CRITICAL,
                 )
