@@ -62,6 +62,8 @@ class Settings(BaseSettings):
         Of one screening.
     max_job_contacts
         Of one screening.
+    max_job_results
+        Blades times contacts of one screening.
     keep_jobs_days, keep_uploads_days
         Jobs that are over, and uploads, are deleted after so many days; 0 keeps them for good.
     max_body_bytes
@@ -138,6 +140,7 @@ class Settings(BaseSettings):
     max_upload_bytes: Count = 512 * 2**20
     max_job_blades: Count = 20_000
     max_job_contacts: Count = 20
+    max_job_results: Count = 100_000
     keep_jobs_days: Annotated[float, Ge(0)] = 90.0
     keep_uploads_days: Annotated[float, Ge(0)] = 7.0
     max_body_bytes: Count = 16 * 2**20

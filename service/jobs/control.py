@@ -57,12 +57,12 @@ class Control:
             return
         self._looked = now
         try:
-            asked = self._records.get(self.job.id).cancel_requested
+            found = self._records.get(self.job.id)
         except SQLAlchemyError as error:  # a database out of reach for a while stops no job
             logger.warning("job %s cannot be looked up: %s", self.job.id, error)
             return
-        if asked:
-            raise Cancelled("the job was cancelled")
+        if found.cancel_requested or found.state.finished or found.attempt != self.job.attempt:
+            raise Cancelled("the job was cancelled, or another run of it has begun")
 
     def sleep(self, seconds: float) -> None:
         """Wait; raises as `check`."""
@@ -98,7 +98,7 @@ class Control:
 
     def _say(self, values: dict[str, Any]) -> None:
         try:
-            self._records.update(self.job.id, **values)
+            self._records.update(self.job.id, of_attempt=self.job.attempt, **values)
         except SQLAlchemyError as error:
             logger.warning("progress of job %s is not kept: %s", self.job.id, error)
         else:

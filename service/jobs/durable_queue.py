@@ -11,12 +11,12 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
-from croniter import croniter
+from croniter import CroniterError, croniter
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import SQLAlchemyError
@@ -205,7 +205,7 @@ class DurableQueue:
         InvalidInput
             When `cron` has not five fields that mean something, or there is no such time zone.
         """
-        if len(cron.split()) != 5 or not croniter.is_valid(cron):
+        if len(cron.split()) != 5 or not croniter.is_valid(cron) or not _comes(cron):
             raise InvalidInput("cron", cron, 'give five fields, e.g. "0 3 * * SUN" for Sundays at three')
         try:
             ZoneInfo(timezone)
@@ -259,6 +259,15 @@ class DurableQueue:
             if status is None or status.status in _OVER:
                 self._begun.discard(begun)
         return self._begun
+
+
+def _comes(cron: str) -> bool:
+    """Whether there is such a time: the 30th of February is none."""
+    try:
+        croniter(cron, datetime.now(UTC)).get_next(datetime)
+    except (CroniterError, ValueError):
+        return False
+    return True
 
 
 def _plain(value: Any) -> str:

@@ -76,8 +76,9 @@ class Tls:
 class DaskEngine:
     """Workers of a local cluster of one's own, or of a scheduler that runs elsewhere: the same path to both.
 
-    Workers start with the first work. What goes to and fro between one's own processes is pickled by dask:
-    its scheduler must not be open to others, so beyond loopback give `tls`.
+    Workers start with the first work. What goes to and fro between one's own processes is pickled by dask, so
+    nobody else may reach its scheduler: the local cluster makes certificates that its own processes alone
+    know; for another give `tls`.
 
     Parameters
     ----------
@@ -171,6 +172,8 @@ class DaskEngine:
         with dask.config.set(settings):
             if self._address is None:
                 self._scratch.mkdir(parents=True, exist_ok=True)
+                # Other users of this machine reach the loopback too: they have none of these certificates.
+                security = Security.temporary()
                 self._cluster = LocalCluster(
                     n_workers=self._workers,
                     threads_per_worker=1,
@@ -179,6 +182,7 @@ class DaskEngine:
                     dashboard_address="127.0.0.1:0",
                     local_directory=str(self._scratch),
                     silence_logs=logging.CRITICAL,
+                    security=security,
                 )
             where = self._cluster if self._address is None else self._address
             self._client = Client(where, security=security, timeout=_CONNECT_S, set_as_default=False)

@@ -20,7 +20,7 @@ from sdm_core.errors import Cancelled, InvalidInput
 from service.jobs.control import Control
 from service.jobs.durable_files import check_room, is_full
 from service.jobs.durable_queue import DurableQueue, HandedBack
-from service.jobs.errors import NoRoom
+from service.jobs.errors import NoRoom, OtherRequest
 from service.jobs.job import ACTIVE, KINDS, Fault, Job, State
 from service.jobs.job_folder import JobFolder, JobFolders
 from service.jobs.retention import Keep, Retention, RetentionThread
@@ -151,9 +151,11 @@ class Jobs:
             raise
         try:
             kept = self.records.add(job)
-        except BaseException:
+        except OtherRequest:
             self.folders.remove(job.id)
             raise
+        # Any other fault may have come after the row was committed: then the job needs its files. Where it
+        # was not, they are marked as listed nowhere, and swept away in time.
         self.folders.unmark(kept.id)
         if kept.id != job.id:  # the same request came twice at the same time
             self.folders.remove(job.id)
@@ -176,11 +178,11 @@ class Jobs:
 
     def cancel(self, job_id: str, kind: str) -> Job:
         """Let a job stop as soon as it can; one that is over stays as it is."""
-        job = self.records.get(job_id, kind)
-        if job.state is State.QUEUED:
-            now = datetime.now(UTC)
-            self.records.update(job_id, only=(State.QUEUED,), state=State.CANCELLED, finished_at=now)
-        self.records.update(job_id, cancel_requested=True)
+        self.records.get(job_id, kind)
+        now = datetime.now(UTC)
+        at_once: dict[str, Any] = {"state": State.CANCELLED, "finished_at": now, "cancel_requested": True}
+        if not self.records.update(job_id, only=(State.QUEUED,), **at_once):
+            self.records.update(job_id, cancel_requested=True)
         return self.get(job_id, kind)
 
     def retry(self, job_id: str, kind: str) -> Job:
@@ -203,7 +205,7 @@ class Jobs:
         """Stop; what runs is handed back within moments, for another process or the next start."""
         self._closing.set()
         self._retention.close()
-        self._tending.join()
+        self._tending.join(patience_s)
         with self._running:
             gone = self._running.wait_for(lambda: not self._controls, patience_s)
         if not gone:
@@ -247,7 +249,8 @@ class Jobs:
         try:
             control.check()
             started = job.started_at or datetime.now(UTC)
-            self.records.update(job.id, state=State.RUNNING, started_at=started, waiting_for=None)
+            if not self._kept(job, state=State.RUNNING, started_at=started, waiting_for=None):
+                raise Cancelled("the job was cancelled before it began")
             folder.note(event="begun", attempt=job.attempt, replica=self._replica)
             self._kinds[job.kind].run(folder, control)
         except Cancelled:
@@ -264,13 +267,15 @@ class Jobs:
         state, fault = outcome
         folder.note(event=state.value, attempt=job.attempt)
         ended = datetime.now(UTC)
-        said: dict[str, Any] = {"state": state, "fault": fault, "finished_at": ended, "waiting_for": None}
+        self._kept(job, state=state, fault=fault, finished_at=ended, waiting_for=None)
+
+    def _kept(self, job: Job, **values: Any) -> bool:
+        """Change the row of a run, however long the database takes; whether it still is this run's."""
         while True:
             try:
-                self.records.update(job.id, **said)
-                return
+                return self.records.update(job.id, of_attempt=job.attempt, **values)
             except SQLAlchemyError as error:  # a full disk, a database that is restarted
-                logger.warning("the end of job %s is not kept yet: %s", job.id, error)
+                logger.warning("the state of job %s is not kept yet: %s", job.id, error)
                 if self._closing.wait(2.0):
                     raise HandedBack from None
 

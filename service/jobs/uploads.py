@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import InvalidInput
+from sdm_core.interruption import checkpoint
 from service.jobs.durable_files import INCOMING, check_room, remove_folder, sync_folder, write_durably
 from service.jobs.errors import DamagedUpload, NoSuchUpload, UploadTooLarge
 
@@ -26,6 +27,8 @@ _ID = re.compile(r"[0-9a-f]{32}")
 _LARGEST_BLADE = 32 * 2**20
 # Compressed JSON of numbers is a third to a tenth of its size; far beyond that a zip is made to do harm.
 _MOST_INFLATED = 200
+_MOST_UNPACKED = 4 * 2**30
+_LOOK_EVERY = 8 * 2**20  # bytes, whether there still is room
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,8 @@ class Upload:
 class UploadWriter:
     """A file that is arriving."""
 
-    def __init__(self, folder: Path, most_bytes: int) -> None:
-        self._folder, self._most = folder, most_bytes
+    def __init__(self, folder: Path, most_bytes: int, reserve_bytes: int = 0) -> None:
+        self._folder, self._most, self._reserve = folder, most_bytes, reserve_bytes
         self._beside = folder / f"{INCOMING}{uuid.uuid4().hex}"
         self._beside.mkdir(parents=True)
         self._file = (self._beside / _CONTENT).open("xb")
@@ -75,6 +78,9 @@ class UploadWriter:
         if self._size > self._most:
             found = f"over {self._most} bytes"
             raise UploadTooLarge("body", found, f"send at most {self._most} bytes: split the file")
+        if self._size // _LOOK_EVERY > (self._size - len(part)) // _LOOK_EVERY:
+            check_room(self._folder, 0, self._reserve)
+            os.utime(self._beside)  # it is still arriving: not left over
         self._digest.update(part)
         self._file.write(part)
 
@@ -138,7 +144,7 @@ class Uploads:
             remedy = f"send at most {self._most} bytes: split the file"
             raise UploadTooLarge("body", f"{announced_bytes} bytes", remedy)
         check_room(self._folder, announced_bytes, self._reserve)
-        return UploadWriter(self._folder, self._most)
+        return UploadWriter(self._folder, self._most, self._reserve)
 
     def get(self, upload_id: str, owner: str | None) -> Upload:
         """A file of this owner; None may see every one's.
@@ -208,6 +214,9 @@ def _came_before(upload: Path, before: datetime) -> bool:
 
 
 def _of_json(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
+    if upload.size_bytes > _LARGEST_BLADE:  # it is read whole, and a parser holds up every other request
+        remedy = "send many blades one a line (application/x-ndjson), or in a zip"
+        raise UploadTooLarge(upload.name, f"{upload.size_bytes} bytes as one JSON value", remedy)
     found = _parsed(path.read_bytes(), upload.name)
     if not isinstance(found, list):
         yield upload.name, found
@@ -220,6 +229,7 @@ def _of_lines(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
     with path.open("rb") as file:
         for i, line in enumerate(iter(lambda: file.readline(_LARGEST_BLADE + 1), b""), 1):
             where = f"{upload.name}:{i}"
+            checkpoint()
             if len(line) > _LARGEST_BLADE:
                 raise UploadTooLarge(where, f"over {_LARGEST_BLADE} bytes", "give one blade a line")
             if line.strip():
@@ -233,11 +243,15 @@ def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
             if not wanted:
                 raise InvalidInput(upload.name, "no *.json in it", "put blade files or profiles into the zip")
             inflated = sum(entry.file_size for entry in wanted)
-            if inflated > _MOST_INFLATED * max(upload.size_bytes, 1):
-                remedy = f"a zip may inflate {_MOST_INFLATED} times"
-                raise UploadTooLarge(upload.name, f"{upload.size_bytes} to {inflated} bytes", remedy)
+            if inflated > _MOST_UNPACKED:
+                found = f"{inflated} bytes unpacked"
+                raise UploadTooLarge(upload.name, found, f"give at most {_MOST_UNPACKED}: split the file")
             for entry in wanted:
                 where = f"{upload.name}/{entry.filename}"
+                checkpoint()
+                if entry.file_size > _MOST_INFLATED * max(entry.compress_size, 1):
+                    found = f"{entry.compress_size} to {entry.file_size} bytes"
+                    raise UploadTooLarge(where, found, f"a file in a zip may inflate {_MOST_INFLATED} times")
                 with archive.open(entry) as member:
                     # Not what the list of contents says it is: that can lie.
                     content = member.read(_LARGEST_BLADE + 1)

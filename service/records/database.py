@@ -127,7 +127,8 @@ def open_database(data_folder: Path, url: str | None = None) -> Database:
         When the folder cannot be made or is being restored, or the database cannot be used.
     """
     try:
-        data_folder.mkdir(parents=True, exist_ok=True)
+        # Hashes of keys and blades lie there: nobody else on this machine need read them.
+        data_folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         remedy = f"it cannot be made ({error.strerror}): give another folder"
         raise InvalidInput("data_folder", str(data_folder), remedy) from None
@@ -140,7 +141,15 @@ def open_database(data_folder: Path, url: str | None = None) -> Database:
 def _engine(url: URL) -> Engine:
     if not url.drivername.startswith("sqlite"):
         # A connection that the server closed meanwhile is found out before it is used.
-        return create_engine(url, pool_pre_ping=True, pool_size=5, max_overflow=15)
+        # One that hangs is given up, like one that refuses.
+        patience = {
+            "connect_timeout": 5,
+            "tcp_user_timeout": 10_000,
+            "keepalives_idle": 10,
+            "keepalives_interval": 5,
+            "options": "-c statement_timeout=30000",
+        }
+        return create_engine(url, pool_pre_ping=True, pool_size=5, max_overflow=15, connect_args=patience)
     engine = create_engine(url, connect_args={"timeout": 30.0})
 
     @event.listens_for(engine, "connect")

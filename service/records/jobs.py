@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
@@ -56,6 +57,9 @@ JOBS = Table(
     Index("rubscreen_jobs_by_age", "kind", "created_at", "id"),
     Index("rubscreen_jobs_by_state", "state"),
 )
+
+
+_ID = re.compile(r"[0-9a-f]{32}")
 
 
 class JobRecords:
@@ -140,13 +144,20 @@ class JobRecords:
             asked = asked.order_by(JOBS.c.created_at.desc(), JOBS.c.id.desc()).limit(limit)
             return [_job(row) for row in connection.execute(asked).mappings()]
 
-    def update(self, job_id: str, *, only: Iterable[State] = ACTIVE, **values: Any) -> bool:
-        """Change columns of a job that is in one of the states `only`; whether it was."""
+    def update(
+        self, job_id: str, *, only: Iterable[State] = ACTIVE, of_attempt: int | None = None, **values: Any
+    ) -> bool:
+        """Change columns of a job that is in one of the states `only`; whether it was.
+
+        With `of_attempt` only while it is at that attempt: a run that was taken over changes nothing more.
+        """
         if isinstance(values.get("state"), State):
             values["state"] = values["state"].value
         if isinstance(values.get("fault"), Fault):
             values["fault"] = values["fault"].to_json()
         change = JOBS.update().where(JOBS.c.id == job_id, JOBS.c.state.in_([s.value for s in only]))
+        if of_attempt is not None:
+            change = change.where(JOBS.c.attempt == of_attempt)
         with self._database.begin() as connection:
             return connection.execute(change.values(**values)).rowcount == 1
 
@@ -220,6 +231,8 @@ class JobRecords:
 
 
 def _get(connection: Connection, job_id: str, kind: str | None) -> Job:
+    if not _ID.fullmatch(job_id):
+        raise NoSuchJob("id", job_id, "give the id of a job: 32 hexadecimal digits")
     asked = select(JOBS).where(JOBS.c.id == job_id)
     if kind is not None:
         asked = asked.where(JOBS.c.kind == kind)

@@ -30,6 +30,7 @@ from service.settings import Settings
 from service.sizes import TooLarge
 
 IDEMPOTENCY_KEY = "Idempotency-Key"
+_SMALL = 100_000  # characters
 logger = logging.getLogger("rubscreen.jobs")
 _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 
@@ -98,12 +99,18 @@ def accept_screening(
         model=None if ask.policy == "exact" else model,
         models_folder=str(models_folder(settings).resolve()),
     )
-    lines = list(_lines(ask, request, uploads, job.owner, settings))
-    size = blades_per_chunk(request, profiles=any(line.profile for line in lines))
-    document = request.to_dict() | {"blades_per_chunk": size}
 
     def fill(folder: Path) -> None:
-        write_durably(folder / blade_lines.FILE, blade_lines.encode(lines))
+        # Each blade goes to the disk as it comes: thousands of them, parsed, would not fit in memory.
+        seen = blade_lines.write(folder, _lines(ask, request, uploads, job.owner, settings))
+        if not seen.blades:
+            raise InvalidInput("blades", "none in all that is named", "give at least one blade")
+        rows = seen.blades * (3 if ask.contacts is None else len(ask.contacts))
+        if rows > settings.max_job_results:
+            remedy = f"give at most {settings.max_job_results} in all: split the request"
+            raise TooLarge("blades x contacts", f"{rows}", remedy)
+        size = blades_per_chunk(request, profiles=seen.profiles)
+        document = request.to_dict() | {"blades_per_chunk": size}
         write_durably(folder / REQUEST, json.dumps(document, indent=1).encode())
 
     return jobs.submit(job, fill)
@@ -132,8 +139,10 @@ def _lines(
         except InvalidInput as error:
             if ask.bad_blades == "refuse":
                 raise error.under(source) from None
-            if not isinstance(document, dict):
-                line = BladeLine(index, source, {})
+            # Noted again when it runs; what is no blade is not kept, however large.
+            named = document.get("name") if isinstance(document, dict) else None
+            small = len(json.dumps(document)) <= _SMALL
+            line = BladeLine(index, source, document if small and named is not None else {})
         yield line
 
 

@@ -18,6 +18,7 @@ from pydantic import (
 from sdm_core.blade import EXAMPLES, blade_to_dict, example_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
+from sdm_core.interruption import checkpoint
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 from service.jobs.job import FIRST_PRIORITY, LAST_PRIORITY, USUAL_PRIORITY
 from service.jobs.screening.request import Criteria
@@ -260,6 +261,8 @@ class ScreeningQuestion(BaseModel):
             raise InvalidInput("criteria.least_margin", self.criteria.least_margin, "give ke_liner too")
         if self.name is not None:
             check_length("name", self.name, settings_of(info).max_name_length, "shorten it")
+            if not self.name.isprintable():
+                raise InvalidInput("name", self.name, "give printable characters")
         return self
 
     def documents(self, uploads: Uploads, owner: str | None, settings: Settings) -> Iterator[tuple[str, Any]]:
@@ -270,10 +273,15 @@ class ScreeningQuestion(BaseModel):
         InvalidInput, NoSuchUpload, UploadTooLarge
             Naming the entry of `blades`.
         """
+        seen: set[str] = set()
         for i, entry in enumerate(self.blades):
             field = f"blades[{i}]"
+            checkpoint()
             if isinstance(entry, dict) and "upload" in entry:
                 upload = uploads.get(_alone(entry, "upload", field), owner)
+                if upload.id in seen:
+                    raise InvalidInput(f"{field}.upload", upload.id, "name each upload once")
+                seen.add(upload.id)
                 yield from uploads.documents(upload, settings.max_job_blades)
             elif isinstance(entry, dict) and "example" in entry:
                 name = _alone(entry, "example", field)

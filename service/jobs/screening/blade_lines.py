@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -61,6 +62,26 @@ class BladeLine:
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
         return {"index": self.index, "source": self.source, "document": self.document}
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: how many blades, and whether profiles are among them."""
+
+    blades: int
+    profiles: bool
+
+
+def write(folder: Path, lines: Iterable[BladeLine]) -> Written:
+    """Write the blades of a job as they come, and force them to the disk."""
+    blades, profiles = 0, False
+    with (folder / FILE).open("xb") as file:
+        for line in lines:
+            blades, profiles = blades + 1, profiles or line.profile
+            file.write(encode([line]))
+        file.flush()
+        os.fsync(file.fileno())
+    return Written(blades, profiles)
 
 
 def encode(lines: Iterable[BladeLine]) -> bytes:

@@ -148,6 +148,9 @@ def to_parquet(table: pa.Table, unscreened: Sequence[UnscreenedBlade]) -> bytes:
 
 def to_csv(table: pa.Table) -> bytes:
     """As CSV with a heading; lists are left out but for the criteria missed."""
+    for name in ("source", "blade", "contact_name"):
+        place = table.schema.get_field_index(name)
+        table = table.set_column(place, name, pa.array([_inert(t) for t in table[name].to_pylist()]))
     missed = [None if names is None else " ".join(names) for names in table["criteria_missed"].to_pylist()]
     place = table.schema.get_field_index("criteria_missed")
     flat = table.set_column(place, "criteria_missed", pa.array(missed, pa.string()))
@@ -163,6 +166,11 @@ def to_rows(table: pa.Table) -> list[dict[str, Any]]:
         row["contact"] = json.loads(row["contact"])
         row["speed_range_hz"] = [row.pop("speed_low_hz"), row.pop("speed_high_hz")]
     return rows
+
+
+def _inert(text: str | None) -> str | None:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text is not None and text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
 def _line(rank: int, row: Mapping[str, Any], criteria: Criteria) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def checked_limit(text: str | None, most: int, usual: int, field: str = "limit")
     """
     if text is None:
         return usual
-    if not text.isascii() or not text.isdecimal() or not 1 <= int(text[:9]) <= most:
+    if len(text) > 9 or not text.isascii() or not text.isdecimal() or not 1 <= int(text) <= most:
         raise InvalidInput(field, text, f"give 1 to {most}")
     return int(text)
 
@@ -140,7 +140,9 @@ def cancelled(request: Request, job_id: str, kind: str) -> Response:
 
 
 def retried(request: Request, job_id: str, kind: str) -> Response:
-    """Run a job of one's own again."""
-    jobs = the_jobs(request).jobs
-    check_owner(jobs.get(job_id, kind), the_caller(request))
+    """Run a job of one's own again, where the quota has room for it."""
+    jobs, caller = the_jobs(request).jobs, the_caller(request)
+    check_owner(jobs.get(job_id, kind), caller)
+    active = 0 if caller.key_id is None else jobs.records.active(caller.key_id)
+    the_desk(request).access.quota.check_job_quota(caller, active, jobs.records.active())
     return job_response(jobs.retry(job_id, kind), 202)
