@@ -49,7 +49,7 @@ done
 [ "$state" = done ]
 
 echo "The ranking, safest first"
-"${asking[@]}" --header 'Accept: text/csv' "$url/v1/screenings/$job/results" | cut -d, -f1,4,5,17
+"${asking[@]}" --header 'Accept: text/csv' "$url/v1/screenings/$job/results" | cut -d, -f1,4,5,6,16
 echo "Those that miss the criteria: $("${asking[@]}" "$url/v1/screenings/$job/results?meets_criteria=false&limit=1" |
   sed -n 's/.*"total":\([0-9]*\).*/\1/p')"
 "${asking[@]}" --output "$work/report.html" "$url/v1/screenings/$job/report"

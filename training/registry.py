@@ -24,6 +24,7 @@ from training.surrogate import Architecture, BoundaryNetwork, Surrogate
 FORMAT = "rubscreen/model/2"
 # Cards before certificates of several rates: their weights are as good, once they are recalibrated.
 _UNCERTIFIED_FORMAT = "rubscreen/model/1"
+_LONGEST_ID = 64
 _WEIGHTS, _CARD = "model.safetensors", "card.json"
 
 
@@ -130,7 +131,7 @@ def load_model(model_id: str | None = None, folder: Path = SHIPPED, *, certified
 
 def is_model(model_id: str, folder: Path = SHIPPED) -> bool:
     """Whether a folder has a model of this name, damaged or not."""
-    return model_id.isalnum() and (folder / model_id).is_dir()
+    return model_id.isalnum() and len(model_id) <= _LONGEST_ID and (folder / model_id).is_dir()
 
 
 def _whole_files(place: Path, certified: bool) -> tuple[dict[str, Any], bytes]:

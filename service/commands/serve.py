@@ -8,6 +8,8 @@ import os
 import socket
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,6 +56,7 @@ def run(
     from service.commands.outputs import check_writable
     from service.operation import logs
     from service.operation.draining import Draining, DrainingServer
+    from service.rest.job_desk import preflight
 
     settings = settings_from(models, keep_answers, data)
     logs.configure_process(settings.log_level, settings.log_format)
@@ -61,6 +64,8 @@ def run(
         check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
     settings = settled(settings, host, listening.getsockname()[0], open_to_all=open_to_all)
+    with listening_or_closed(listening):
+        preflight(settings)
     draining = Draining()
     app = create_app(settings, draining=draining)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
@@ -77,6 +82,16 @@ def run(
     with listening:
         DrainingServer(config, draining, settings.drain_s).run(sockets=[listening])
     _leave_none_behind()
+
+
+@contextmanager
+def listening_or_closed(listening: socket.socket) -> Iterator[None]:
+    """Close the socket where the block fails."""
+    try:
+        yield
+    except BaseException:
+        listening.close()
+        raise
 
 
 def _leave_none_behind() -> None:

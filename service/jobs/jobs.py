@@ -97,7 +97,7 @@ class Jobs:
         self.records, self.folders = JobRecords(database), JobFolders(data_folder)
         self._kinds, self.settings = kinds, settings
         self._replicas = Replicas(database)
-        self._lock = None if database.shared else _alone(data_folder)
+        self._lock = None if database.shared else alone(data_folder)
         # On SQLite there is one process, which takes up what the one before it had begun.
         self._replica = f"replica-{uuid.uuid4().hex[:12]}" if database.shared else "alone"
         self._closing, self._running = threading.Event(), threading.Condition()
@@ -318,8 +318,14 @@ class Jobs:
             self._lock.release()
 
 
-def _alone(data_folder: Path) -> FileLock:
-    """Hold the data folder, for one process."""
+def alone(data_folder: Path) -> FileLock:
+    """Hold the data folder, for one process.
+
+    Raises
+    ------
+    InvalidInput
+        When another one does.
+    """
     lock = FileLock(data_folder / ".lock")
     try:
         lock.acquire(timeout=5.0)

@@ -140,9 +140,8 @@ def _lines(
             if ask.bad_blades == "refuse":
                 raise error.under(source) from None
             # Noted again when it runs; what is no blade is not kept, however large.
-            named = document.get("name") if isinstance(document, dict) else None
-            small = len(json.dumps(document)) <= _SMALL
-            line = BladeLine(index, source, document if small and named is not None else {})
+            kept = isinstance(document, dict) and len(json.dumps(document)) <= _SMALL
+            line = BladeLine(index, source, document if kept else {})
         yield line
 
 

@@ -20,6 +20,7 @@ from service.rest.gate import Access
 from service.rest.job_desk import JobDesk
 from service.rest.limits import WorkQueue
 from service.rest.models_folder import models_folder, prepare_models
+from service.rest.self_check import self_check
 from service.screening.screen import ScreeningResult
 from service.settings import Settings
 from training.observers import OnExact
@@ -162,6 +163,16 @@ class Desk:
     def model_for_jobs(self, policy: str) -> str | None:
         """The surrogate that a job accepted now is screened with; raises as `answerer`."""
         return None if policy == "exact" else self.answering_now(policy).model_id
+
+    def check_alpha(self, policy: str, alpha: float | None) -> None:
+        """Refuse a rate that the model has no certificate for, before many blades are asked about.
+
+        Raises
+        ------
+        InvalidInput
+        """
+        if alpha is not None:
+            self_check(self.answering_now(policy).screener, policy, alpha)
 
     def card(self, model_id: str | None) -> dict[str, Any] | None:
         """The card of a model; None where there is no such model any more."""

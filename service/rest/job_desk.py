@@ -9,14 +9,14 @@ from sdm_core.errors import InvalidInput
 from service.jobs.engine import DaskEngine, Engine, Tls, checked_scheduler
 from service.jobs.job import SCREENING, TRAINING
 from service.jobs.job_folder import SCRATCH
-from service.jobs.jobs import Jobs, JobSettings, Kind
+from service.jobs.jobs import Jobs, JobSettings, Kind, alone
 from service.jobs.retention import Keep
 from service.jobs.screening.checks import limits_of
 from service.jobs.screening.kind import ScreeningKind
 from service.jobs.screening.watched import OnStored
 from service.jobs.training.kind import TrainingKind
 from service.jobs.uploads import Uploads
-from service.records.database import Database
+from service.records.database import Database, open_database
 from service.rest.accepting import train_when_due
 from service.settings import Settings
 
@@ -81,3 +81,27 @@ def _tls(settings: Settings) -> Tls | None:
     ca, cert, key = files.values()
     assert ca is not None and cert is not None and key is not None
     return Tls(ca, cert, key)
+
+
+def preflight(settings: Settings) -> None:
+    """Refuse what the service could not start with, before it listens.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the setting, its value and the remedy.
+    """
+    checked_scheduler(settings.scheduler, _tls(settings))
+    if settings.models_folder is not None and not settings.models_folder.is_dir():
+        found = str(settings.models_folder)
+        raise InvalidInput(
+            "models_folder", found, "give a folder of models, or leave it out for the shipped one"
+        )
+    if settings.data_folder is None:
+        return
+    database = open_database(settings.data_folder, settings.database_url)
+    try:
+        if not database.shared:
+            alone(settings.data_folder).release()
+    finally:
+        database.close()

@@ -20,6 +20,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
+from service.jobs.errors import NoSuchUpload
 from service.jobs.job import FIRST_PRIORITY, LAST_PRIORITY, USUAL_PRIORITY
 from service.jobs.screening.request import Criteria
 from service.jobs.uploads import Uploads
@@ -278,7 +279,10 @@ class ScreeningQuestion(BaseModel):
             field = f"blades[{i}]"
             checkpoint()
             if isinstance(entry, dict) and "upload" in entry:
-                upload = uploads.get(_alone(entry, "upload", field), owner)
+                try:
+                    upload = uploads.get(_alone(entry, "upload", field), owner)
+                except NoSuchUpload as error:
+                    raise NoSuchUpload(f"{field}.upload", error.value, error.remedy) from None
                 if upload.id in seen:
                     raise InvalidInput(f"{field}.upload", upload.id, "name each upload once")
                 seen.add(upload.id)

@@ -18,7 +18,7 @@ _SPEED_HZ, _KE = np.array([40.0, 40.0]), np.array([400.0, 40000.0])
 _STABLE = [1.0, 0.0]
 
 
-def self_check(answerer: Answerer, policy: str) -> PointAnswers:
+def self_check(answerer: Answerer, policy: str, alpha: float | None = None) -> PointAnswers:
     """The answer to the question.
 
     Raises
@@ -26,7 +26,7 @@ def self_check(answerer: Answerer, policy: str) -> PointAnswers:
     NotReady
         When it is not the known one.
     """
-    found = answerer.points(_BLADE, _CONTACT, _SPEED_HZ, _KE, policy)
+    found = answerer.points(_BLADE, _CONTACT, _SPEED_HZ, _KE, policy, alpha)
     if found.stable.tolist() != _STABLE:
         remedy = f"it must be {_STABLE}: activate another model, or install the service again"
         raise NotReady("self_check", f"{found.stable.tolist()} under {policy}", remedy)

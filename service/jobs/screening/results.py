@@ -154,8 +154,10 @@ def to_csv(table: pa.Table) -> bytes:
     missed = [None if names is None else " ".join(names) for names in table["criteria_missed"].to_pylist()]
     place = table.schema.get_field_index("criteria_missed")
     flat = table.set_column(place, "criteria_missed", pa.array(missed, pa.string()))
+    # The contact last: it is JSON, whose commas lead astray whoever cuts lines at commas.
+    names = [name for name in flat.column_names if name not in ("contact", "critical_speeds")]
     buffer = io.BytesIO()
-    pyarrow.csv.write_csv(flat.drop_columns(["critical_speeds"]), buffer)
+    pyarrow.csv.write_csv(flat.select([*names, "contact"]), buffer)
     return buffer.getvalue()
 
 

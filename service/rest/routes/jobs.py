@@ -42,8 +42,8 @@ def the_jobs(request: Request) -> JobDesk:
     return desk.jobs
 
 
-def checked_limit(text: str | None, most: int, usual: int, field: str = "limit") -> int:
-    """A whole number of the query, from 1 up.
+def checked_limit(text: str | None, most: int, usual: int, field: str = "limit", least: int = 1) -> int:
+    """A whole number of the query, from `least` up.
 
     Raises
     ------
@@ -51,8 +51,8 @@ def checked_limit(text: str | None, most: int, usual: int, field: str = "limit")
     """
     if text is None:
         return usual
-    if len(text) > 9 or not text.isascii() or not text.isdecimal() or not 1 <= int(text) <= most:
-        raise InvalidInput(field, text, f"give 1 to {most}")
+    if len(text) > 9 or not text.isascii() or not text.isdecimal() or not least <= int(text) <= most:
+        raise InvalidInput(field, text, f"give {least} to {most}")
     return int(text)
 
 

@@ -78,6 +78,7 @@ async def screen_a_batch(
         active = 0 if caller.key_id is None else records.active(caller.key_id)
         service.access.quota.check_job_quota(caller, active, records.active())
         model = service.model_for_jobs(ask.policy)
+        service.check_alpha(ask.policy, ask.alpha)
         return accept_screening(ask, job, desk.jobs, desk.uploads, service.settings, model)
 
     job, _ = await service.work.run(accept, request)
@@ -156,7 +157,7 @@ async def screening_results(
         job = desk.jobs.get(job_id, SCREENING)
         form = best_form(request.headers.get("accept"), (JSON, CSV, PARQUET))
         many = checked_limit(limit, MOST_ROWS, 100)
-        first = 0 if offset in (None, "0") else checked_limit(offset, 10**8, 0, "offset")
+        first = checked_limit(offset, 10**8, 0, "offset", least=0)
         table, unscreened, complete = results(desk.jobs.folders.of(job.id))
         asked = {"contact": contact, "verdict": verdict, "meets_criteria": meets_criteria}
         table = _filtered(table, asked)
@@ -234,7 +235,7 @@ async def _picture(request: Request, job_id: str, index: str, contact: str | Non
 
     def make() -> bytes:
         job = desk.jobs.get(job_id, SCREENING)
-        place = 0 if index == "0" else checked_limit(index, 10**8, 0, "index")
+        place = checked_limit(index, 10**8, 0, "index", least=0)
         blade = pictures.screened_blade(desk.jobs.folders.of(job.id), place)
         if contact is None:
             return pictures.boundaries_chart(blade)

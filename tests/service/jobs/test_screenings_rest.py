@@ -117,6 +117,8 @@ def test_results_come_by_pages_filters_and_forms(http, done):
         ({"limit": "1001"}, "limit"),
         ({"offset": "-1"}, "offset"),
         ({"offset": "²"}, "offset"),
+        ({"limit": "0000000019999999"}, "limit"),
+        ({"offset": "100000000" + "0" * 5000}, "offset"),
         ({"meets_criteria": "maybe"}, "meets_criteria"),
     ],
 )
@@ -170,7 +172,7 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
     for row, other in zip(rows, same, strict=True):
         assert row | {"source": ""} == other | {"source": ""}
     again = http.post("/v1/screenings", json=question)
-    assert (again.status_code, again.json()["field"]) == (404, "upload")
+    assert (again.status_code, again.json()["field"]) == (404, "blades[0].upload")
 
 
 @pytest.mark.parametrize(
@@ -179,7 +181,7 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
         ({"bad_blades": "refuse"}, 422, "blades[2].schema"),
         ({"blades": []}, 422, "blades"),
         ({"blades": [5], "bad_blades": "refuse"}, 422, "blades[0]"),
-        ({"blades": [{"upload": "../x"}]}, 404, "upload"),
+        ({"blades": [{"upload": "../x"}]}, 404, "blades[0].upload"),
         ({"blades": [{"example": "no"}]}, 422, "blades[0].example"),
         ({"blades": [{"example": "nasa_rotor_37"}] * 51}, 413, "blades"),
         (
@@ -201,6 +203,8 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
         ({"map_shape": [1, 8]}, 422, "map_shape"),
         ({"map_shape": [1000, 1000]}, 413, "map_shape"),
         ({"policy": "guess"}, 422, "policy"),
+        ({"alpha": 0.3}, 422, "alpha"),
+        ({"name": "a\x00b"}, 422, "name"),
         ({"priority": 0}, 422, "priority"),
         ({"priority": 10}, 422, "priority"),
         ({"bad_blades": "eat"}, 422, "bad_blades"),
