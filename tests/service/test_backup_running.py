@@ -24,7 +24,7 @@ from sdm_core.blade import blade_to_dict, example_blade
 
 BLADE = blade_to_dict(example_blade("nasa_rotor_37"))
 # So many that a chunk is one blade, and takes some seconds.
-CONTACTS = [{"name": f"c{i}", "weights": {"LE": 1.0, "TE": 0.1 + 0.05 * i}} for i in range(16)]
+CONTACTS = [{"name": f"c{i}", "weights": {"LE": 1.0, "TE": 0.1 + 0.05 * i}} for i in range(14)]
 FORMS = ("application/json", "text/csv", "application/vnd.apache.parquet")
 MANY = 6
 
@@ -65,7 +65,7 @@ def screened(client: httpx.Client, many: int, contacts: Any) -> str:
 
 
 def until(client: httpx.Client, job: str, there: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    deadline = time.monotonic() + 180.0
+    deadline = time.monotonic() + 400.0
     while not there(found := client.get(f"/v1/screenings/{job}").json()):
         assert found["state"] in ("queued", "running", "done"), found
         assert time.monotonic() < deadline, found
