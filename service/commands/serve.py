@@ -59,13 +59,13 @@ def run(
     from service.rest.job_desk import preflight
 
     settings = settings_from(models, keep_answers, data)
-    logs.configure_process(settings.log_level, settings.log_format)
     if settings.served_answers_folder is not None:
         check_writable(**{"keep-answers": f"{settings.served_answers_folder}/served"})
     listening = _listening(host, port)
     settings = settled(settings, host, listening.getsockname()[0], open_to_all=open_to_all)
     with listening_or_closed(listening):
         preflight(settings)
+    logs.configure_process(settings.log_level, settings.log_format)
     draining = Draining()
     app = create_app(settings, draining=draining)
     shown = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{listening.getsockname()[1]}"
