@@ -160,8 +160,8 @@ class DaskEngine:
         settings = {
             "distributed.scheduler.allowed-failures": _MOST_DEATHS,
             "distributed.comm.timeouts.connect": f"{_CONNECT_S}s",
-            # Workers of a killed service end with it, and need not say so.
-            "distributed.admin.log-format": "%(name)s - %(levelname)s - %(message)s",
+            # Its samples of what the workers do are kept for a thousand seconds, and are hundreds of MB then.
+            "distributed.worker.profile.enabled": False,
         }
         security = None
         if self._tls is not None:
