@@ -14,6 +14,8 @@ import shutil
 import time
 from pathlib import Path
 
+import torch
+
 from benchmarks.jobs.dask_cluster import DaskCluster
 from benchmarks.jobs.following import content_of, notes_of, submit, until_over
 from benchmarks.jobs.service_process import ServiceProcess
@@ -50,6 +52,7 @@ def timed(
 
 def plain_loop(data: Path, job: str) -> tuple[set[str], float]:
     """Checksums of the chunks of a job computed one after the other here, and the seconds."""
+    torch.set_num_threads(1)  # as workers do
     folder = data / "jobs" / job
     request = json.loads((folder / "request.json").read_text())
     limits = limits_of(Settings())

@@ -33,6 +33,12 @@ def chunk_payload(request: dict[str, Any], blades: Sequence[BladeLine], limits: 
     ).encode()
 
 
+def compute_in_worker(payload: bytes) -> bytes:
+    """As `compute_chunk`, in a process for that alone: on one thread, and behind what answers people."""
+    _be_modest()
+    return compute_chunk(payload)
+
+
 def compute_chunk(payload: bytes) -> bytes:
     """Screen the blades of a chunk; what is wrong with a blade is noted, and stops none of the others.
 
@@ -45,7 +51,6 @@ def compute_chunk(payload: bytes) -> bytes:
     InvalidInput
         When the model cannot be loaded.
     """
-    _be_modest()
     asked = json.loads(payload)
     request = ScreeningRequest.from_dict(asked["request"])
     limits = Settings.model_construct(**asked["limits"])
@@ -100,7 +105,7 @@ def _screener(models_folder: str | None, model: str | None) -> Screener:
 
 @cache
 def _be_modest() -> None:
-    """Once a process: one thread, and behind what answers people."""
+    """Once a process."""
     os.environ.setdefault("RUBSCREEN_WORKER", "1")
     import torch
 

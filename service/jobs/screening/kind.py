@@ -19,7 +19,7 @@ from service.jobs.engine import Engine, EngineGone, WorkerKilled
 from service.jobs.errors import NoRoom
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.blade_lines import BladeLine, read_chunks
-from service.jobs.screening.chunk import chunk_payload, compute_chunk
+from service.jobs.screening.chunk import chunk_payload, compute_in_worker
 from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade, rows_of
 from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import ScreeningRequest
@@ -154,7 +154,7 @@ class ScreeningKind:
 
     def _submit(self, asked: dict[str, Any], blades: list[BladeLine], control: Control) -> Future[bytes]:
         payload = chunk_payload(asked, blades, self._limits)
-        return self._engine.submit(compute_chunk, payload, control.job.priority)
+        return self._engine.submit(compute_in_worker, payload, control.job.priority)
 
     def _content(
         self, future: Future[bytes], asked: dict[str, Any], blades: list[BladeLine], control: Control
