@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import shutil
+import uuid
 from pathlib import Path
 
+from sdm_core.errors import InvalidInput
 from service.settings import Settings
 from training.activation import FIRST, SHIPPED, activate, active_id
 
@@ -36,8 +38,8 @@ def prepare_models(settings: Settings) -> None:
     place = folder / shipped
     if not place.is_dir():
         folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / f".{shipped}"  # no model by this name is ever listed
-        shutil.rmtree(beside, ignore_errors=True)
+        # No model by such a name is ever listed; of its own, for another replica may start at the same time.
+        beside = folder / f".{shipped}-{uuid.uuid4().hex}"
         shutil.copytree(SHIPPED / shipped, beside)
         try:
             beside.rename(place)
@@ -46,4 +48,8 @@ def prepare_models(settings: Settings) -> None:
         if (folder / "active").exists():
             logger.info("model %s came with this version; promote it to use it", shipped)
     if not (folder / "active").exists():
-        activate(shipped, folder, FIRST, expected=None)
+        try:
+            activate(shipped, folder, FIRST, expected=None)
+        except InvalidInput:
+            if not (folder / "active").exists():  # nor has another replica just done it
+                raise
