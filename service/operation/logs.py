@@ -57,6 +57,7 @@ def configure_process(level: str, form: LogFormat = "auto", stream: TextIO | Non
         logger.setLevel(least)
     for name in ("uvicorn.error", "uvicorn.access"):
         logging.getLogger(name).handlers = []
+        logging.getLogger(name).setLevel(logging.NOTSET)  # as the logger above it says
     logging.captureWarnings(True)
 
 

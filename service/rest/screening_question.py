@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -262,8 +263,8 @@ class ScreeningQuestion(BaseModel):
             raise InvalidInput("criteria.least_margin", self.criteria.least_margin, "give ke_liner too")
         if self.name is not None:
             check_length("name", self.name, settings_of(info).max_name_length, "shorten it")
-            if not self.name.isprintable():
-                raise InvalidInput("name", self.name, "give printable characters")
+            if any(unicodedata.category(character) in ("Cc", "Cs") for character in self.name):
+                raise InvalidInput("name", self.name, "leave out control characters")
         return self
 
     def documents(self, uploads: Uploads, owner: str | None, settings: Settings) -> Iterator[tuple[str, Any]]:

@@ -86,6 +86,8 @@ def test_ctrl_c_leaves_the_job_running_and_says_how_to_watch_it_again(rubscreen,
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
+        # What runs in the background is started with Ctrl-C ignored, these tests perhaps too.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert watching.stderr is not None
     job = watching.stderr.readline().split()[-1]

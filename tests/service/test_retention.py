@@ -303,7 +303,8 @@ def test_a_dry_run_names_what_would_go_and_deletes_nothing(office):
     assert (office.rows(), office.files()) == before
 
 
-def test_jobs_are_listed_by_state_and_shown_by_the_beginning_of_their_name(office):
+def test_jobs_are_listed_by_state_and_shown_by_the_beginning_of_their_name(office, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)  # a narrow terminal cuts identifiers off
     done, failed = office.job(State.DONE), office.job(State.FAILED)
     data = ["--data", str(office.folder)]
     listed = CliRunner().invoke(cli.app, ["jobs", "list", "--state", "failed", *data])
