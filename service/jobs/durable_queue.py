@@ -164,7 +164,7 @@ class DurableQueue:
 
     def take_over(self, replica: str) -> None:
         """Queue again what a replica had begun; harmless when asked twice."""
-        # Public recovery needs DBOS's own paid supervisor; this is what it calls.
+        # DBOS leaves this to its supervisor, Conductor, and has no public call for it.
         DBOS._recover_pending_workflows([replica])
 
     def forget(self, job_id: str, attempts: int) -> None:

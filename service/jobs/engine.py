@@ -160,7 +160,7 @@ class DaskEngine:
         settings = {
             "distributed.scheduler.allowed-failures": _MOST_DEATHS,
             "distributed.comm.timeouts.connect": f"{_CONNECT_S}s",
-            # Its samples of what the workers do are kept for a thousand seconds, and are hundreds of MB then.
+            # Samples of what workers do, kept as they run: nobody looks at them, and workers grew meanwhile.
             "distributed.worker.profile.enabled": False,
         }
         security = None

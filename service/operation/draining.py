@@ -72,7 +72,7 @@ class DrainingServer(uvicorn.Server):
         if self._stop_at is not None:
             if not self._announced:
                 self._announced = True
-                logger.info("draining for %.1f s", self._stop_at - time.monotonic())
+                logger.info("draining for %.1f s", max(0.0, self._stop_at - time.monotonic()))
             self.should_exit = self.should_exit or time.monotonic() >= self._stop_at
         return await super().on_tick(counter)
 

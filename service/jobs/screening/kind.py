@@ -50,7 +50,7 @@ class ScreeningKind:
     engine
         Where chunks are computed.
     limits
-        Settings that bound what the exact core is asked (`service.rest.limits.check_reach`).
+        Settings that bound what the exact core is asked (`service.sizes.check_reach`).
     reserve_bytes
         Room to leave on the disk.
     models_folder
