@@ -47,7 +47,7 @@ def vector(
         raise InvalidInput(field, values, "give a list of numbers")
     if len(values) == 0:
         raise InvalidInput(field, "[]", "give at least one number")
-    array = values if isinstance(values, np.ndarray) and values.dtype.kind == "f" else None
+    array = _plain_numbers(values)
     if array is not None and array.ndim == 1:
         bad = ~np.isfinite(array) | (array > high) | (array < low)
         if open_low:
@@ -62,6 +62,18 @@ def vector(
         )
     out.setflags(write=False)
     return out
+
+
+def _plain_numbers(values: Any) -> np.ndarray | None:
+    """Floats as an array, at once; None for what has to be looked at one by one, so that it is named."""
+    if isinstance(values, np.ndarray):
+        return values if values.dtype.kind == "f" else None
+    if not isinstance(values, list | tuple) or not {int, float}.issuperset(map(type, values)):
+        return None
+    try:
+        return np.array(values, dtype=float)
+    except OverflowError:  # an integer beyond every double
+        return None
 
 
 def matrix(field: str, rows: Any, columns: int | None, low: float, high: float, unit: str) -> np.ndarray:

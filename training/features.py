@@ -257,7 +257,11 @@ def single_mode_lobes(xi: Tensor, phase: Tensor) -> tuple[Lobes, Lobes]:
     turns = (phase * tip + 2 * torch.arctan((tip**2 - 1) / (2 * xi * tip))) / (2 * np.pi)
     first = torch.floor(phase / (2 * np.pi)) + 1  # smallest k with u > 0
     below = torch.maximum(torch.floor(turns), first)
-    a, b = _lobe(xi, phase, below), _lobe(xi, phase, below + 1)
+    # Both at once: for one speed the calls cost more than what they compute.
+    both = _lobe(xi.repeat(2, 1), phase.repeat(2, 1), torch.cat([below, below + 1]))
+    a, b = (
+        Lobes(*(column.chunk(2)[i] for column in (both.log_kappa, both.place, both.ratio))) for i in (0, 1)
+    )
     swap = b.log_kappa < a.log_kappa
 
     def pick(choose_b: Tensor) -> Lobes:

@@ -61,8 +61,8 @@ class ServiceProcess:
         assert self._address is not None
         return self._address
 
-    def ready(self, patience_s: float = 90.0) -> Self:
-        """Wait until it answers."""
+    def ready(self, patience_s: float = 90.0, probe: str = "/readyz") -> Self:
+        """Wait until it says that it is ready; with `/healthz` as `probe`, until it answers at all."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end:
             if self.process.poll() is not None:
@@ -70,7 +70,7 @@ class ServiceProcess:
                 raise RuntimeError("the service ended: " + "".join(self.said))
             if self._address is not None:
                 try:
-                    if httpx.get(f"{self._address}/readyz", timeout=20.0).status_code == 200:
+                    if httpx.get(f"{self._address}{probe}", timeout=20.0).status_code == 200:
                         return self
                 except httpx.HTTPError:
                     pass

@@ -170,8 +170,11 @@ class Jobs:
         ------
         NoSuchJob
         """
-        job = self.records.get(job_id, kind)
-        control = self._controls.get(job_id)
+        return self.as_it_is(self.records.get(job_id, kind))
+
+    def as_it_is(self, job: Job) -> Job:
+        """A job of the records, with what it waits for: a full disk keeps that from the records."""
+        control = self._controls.get(job.id)
         if control is not None and control.waiting_for is not None and not job.state.finished:
             return replace(job, state=State.WAITING, waiting_for=control.waiting_for)
         return job

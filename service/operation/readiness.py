@@ -17,6 +17,7 @@ from service.records.database import Database
 # A probe comes every few seconds from each balancer; answers as old as this are as good.
 KEEP_S = 1.0
 DATABASE_PATIENCE_S = 2.0
+LEAST_FREE_BYTES = 2**20  # a few transactions of SQLite, and a line in each log
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,15 @@ def disk_check(folder: Path, reserve_bytes: int) -> Check:
     """Whether there is room left for the database to be written.
 
     Jobs wait by themselves while less than `reserve_bytes` is free, and questions are answered meanwhile.
-    With only a quarter of that left it is not they who fill the disk, and the database is next.
+    With only a quarter of that left it is not they who fill the disk, and the database is next. With less
+    than `LEAST_FREE_BYTES` it is full, whatever the reserve.
     """
-    least_bytes = reserve_bytes // 4
+    least_bytes = max(reserve_bytes // 4, LEAST_FREE_BYTES)
     try:
         free = shutil.disk_usage(folder).free
     except OSError as error:
         return Check(False, f"{folder}: {error.strerror}", remedy="mount it, or give another data_folder")
     detail = f"{free / 2**20:,.0f} MiB free in {folder}"
-    remedy = f"make room: jobs go on from {reserve_bytes / 2**20:,.0f} MiB on (min_free_bytes)"
+    goes_on = max(reserve_bytes, LEAST_FREE_BYTES) / 2**20
+    remedy = f"make room: jobs go on from {goes_on:,.0f} MiB on (min_free_bytes)"
     return Check(free >= least_bytes, detail, remedy=remedy)

@@ -17,17 +17,21 @@ from pydantic import (
     model_validator,
 )
 
-from sdm_core.blade import SCHEMA, Blade, blade_from_dict
+from sdm_core.blade import SCHEMA, Blade
 from sdm_core.blade_sensitivity import check_differentiable
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
+from service.rest.known_blades import KnownBlades
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
 from service.sizes import TooLarge, check_blade_size, check_length, check_reach
 from training.answers import POLICIES
 
 Asked = TypeVar("Asked", bound=BaseModel)
+
+# A design tool asks about one blade again and again: reading it costs as much as answering does.
+_KNOWN_BLADES = KnownBlades()
 
 
 def the_blade(value: Any, info: ValidationInfo) -> Blade:
@@ -36,7 +40,7 @@ def the_blade(value: Any, info: ValidationInfo) -> Blade:
         raise InvalidInput("blade", value, f"give an object with schema {SCHEMA!r}")
     check_blade_size(value, settings_of(info))
     try:
-        return blade_from_dict(value)
+        return _KNOWN_BLADES.blade(value)
     except InvalidInput as error:
         raise error.under("blade") from None
 

@@ -29,10 +29,11 @@ class Readiness:
         self._limiter = CapacityLimiter(1)
         self._of_model: tuple[Answering, KeptCheck] | None = None
         self._others: dict[str, KeptCheck] = {}
-        if desk.database is not None:
-            self._others["database"] = KeptCheck(DatabaseCheck(desk.database))
+        # The disk first: where it is full, the database does not answer either, and is not what to mend.
         if desk.settings.data_folder is not None:
             self._others["disk"] = KeptCheck(self._disk)
+        if desk.database is not None:
+            self._others["database"] = KeptCheck(DatabaseCheck(desk.database))
         self.solver = ""
 
     async def checks(self) -> dict[str, Check]:

@@ -30,7 +30,7 @@ def serve(serving, screener, tmp_path):
 def test_a_service_with_a_data_folder_looks_at_database_and_disk(serve):
     with serve() as url:
         checks = httpx.get(f"{url}/readyz", timeout=20.0).json()["checks"]
-    assert list(checks) == ["self_check", "database", "disk"]
+    assert list(checks) == ["self_check", "disk", "database"]
     assert all(check["ok"] and check["needed"] for check in checks.values())
 
 

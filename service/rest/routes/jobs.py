@@ -128,7 +128,7 @@ def jobs_page(
         query: dict[str, Any] = {"limit": many, "after": found[many - 1].id}
         query |= {} if state is None else {"state": state}
         following = f"/v1/{kind}s?{urlencode(query)}"
-    document = {"jobs": [job.to_dict() for job in found[:many]], "next": following}
+    document = {"jobs": [desk.jobs.as_it_is(job).to_dict() for job in found[:many]], "next": following}
     return Response(replies.to_json(document), media_type=JSON)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import threading
 from collections import Counter
 from concurrent.futures import Future
@@ -185,25 +184,6 @@ def test_a_job_waits_while_there_is_no_worker_at_all(tmp_path):
     ScreeningKind(engine, {}, 0).run(folder, told)
     assert told.waited_for == ["a worker: the scheduler has none"]
     assert engine.asked == Counter(SOURCES)
-
-
-def _mountable() -> bool:
-    """Whether a small file system can be made here."""
-    if os.geteuid() != 0:
-        return False
-    tried = subprocess.run(["unshare", "--mount", "true"], capture_output=True)
-    return tried.returncode == 0
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    if not _mountable():
-        pytest.skip("no file system can be mounted here: not root")
-    place = tmp_path / "disk"
-    place.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(place)], check=True)
-    yield place
-    subprocess.run(["umount", "--lazy", str(place)], check=True)
 
 
 @pytest.mark.parametrize("reserve_bytes", [0, 128 * 1024], ids=["full to the last byte", "with a reserve"])
