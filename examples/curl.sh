@@ -44,4 +44,5 @@ question '"speed_hz": [-1], "ke": [1]' |
     --data-binary @- "$url/v1/stability"; echo
 
 echo "The models of the service"
-"${asking[@]}" "$url/v1/models" | head -c 60; echo
+"${asking[@]}" "$url/v1/models" -o "$work/models.json"
+head -c 60 "$work/models.json"; echo
