@@ -60,6 +60,14 @@ def test_the_exact_core_runs_without_torch_and_without_a_web_framework():
     assert not loaded_after(f"import {modules}") & {"torch", "fastapi", "pydantic", "uvicorn", "sklearn"}
 
 
+def test_integration_in_time_shares_nothing_with_what_it_bears_witness_to():
+    loaded = loaded_after("import sdm_core.time_domain.witness, sdm_core.time_domain.fitted_growth")
+    solvers = ("semi_discretization", "collocation", "floquet", "permanent_contact", "stability", "boundary")
+    assert [
+        name for name in loaded if name.startswith(tuple(f"sdm_core.{solver}" for solver in solvers))
+    ] == []
+
+
 def test_the_command_line_shows_its_help_without_loading_numpy_or_torch():
     assert not loaded_after("import service.cli") & {"torch", "numpy", "scipy", "fastapi", "matplotlib"}
 
