@@ -27,6 +27,7 @@ from service.commands import (
     serve,
     train,
     trainings,
+    verify,
 )
 
 
@@ -73,7 +74,20 @@ def rubscreen(
     """Screen turbomachinery blades for rub-induced instability."""
 
 
-for command in (demo, serve, screen, assess, map, boundary, sensitivities, train, paper, backup, restore):
+for command in (
+    demo,
+    serve,
+    screen,
+    assess,
+    map,
+    boundary,
+    sensitivities,
+    verify,
+    train,
+    paper,
+    backup,
+    restore,
+):
     app.command(command.__name__.rpartition(".")[2])(command.run)
 
 app.add_typer(blade.app, name="blade")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sdm_core.blade_sensitivity import Influence
     from sdm_core.lobe_tips import CriticalSpeed
     from service.screening.screen import ScreeningReport
+    from service.verification.comparison import Verified
     from training.answers import CertificateUsed
 
 
@@ -46,6 +47,36 @@ def influences_table(title: str, influences: Sequence[Influence], most: int = 10
             f"{each.value:.6g} {each.unit}".strip(),
             f"{each.derivative:+,.4g}",
             f"{each.relative:+.4g}" + (" per revolution" if each.unit == "revolutions" else ""),
+        )
+    return table
+
+
+def verification_table(title: str, found: Sequence[Verified]) -> Table:
+    """What exact core, integration in time and surrogate say of each point."""
+    table = Table(
+        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    table.add_column("point")
+    for heading in ("speed [Hz]", "K_e [N/m]"):
+        table.add_column(heading, justify="right")
+    for heading in ("exact", "in time", "surrogate", "served"):
+        table.add_column(heading)
+    for heading in ("|μ| exact", "differs by", "chatter [Hz]"):
+        table.add_column(heading, justify="right")
+    said = {True: "stable", False: "unstable", None: "–"}
+    for v in found:
+        beside = ", also " + ", ".join(f"{hz:.1f}" for _, hz in v.nearly_equal) if v.nearly_equal else ""
+        table.add_row(
+            v.point.kind,
+            f"{v.point.speed_hz:.3f}",
+            f"{v.point.ke:,.1f}",
+            said[v.exact],
+            said[v.witness] if v.agrees else f"[bold red]{said[v.witness]}[/bold red]",
+            said[v.surrogate],
+            f"[bold red]{said[v.served]}[/bold red]" if v.served_wrongly else v.source,
+            f"{v.radius_exact:.8f}",
+            f"{v.radius_difference:.1e}",
+            f"{v.chatter_exact_hz:.2f}{beside}",
         )
     return table
 
