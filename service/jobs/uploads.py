@@ -16,6 +16,7 @@ from typing import Any
 
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
+from sdm_core.json_members import parse_json
 from service.jobs.durable_files import INCOMING, check_room, remove_folder, sync_folder, write_durably
 from service.jobs.errors import DamagedUpload, NoSuchUpload, UploadTooLarge
 
@@ -266,7 +267,9 @@ def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
 
 def _parsed(content: bytes, where: str) -> Any:
     try:
-        return json.loads(content)
+        return parse_json(content)
+    except InvalidInput as error:
+        raise error.under(where) from None
     except (ValueError, RecursionError) as error:
         said = str(error) or "nested too deep"
         raise DamagedUpload(where, f"{len(content)} bytes", f"give JSON in UTF-8 ({said})") from None
