@@ -61,7 +61,7 @@ def test_every_variable_that_the_project_speaks_of_is_known():
             names |= set(re.findall(r"\bRUBSCREEN_[A-Z0-9_]*[A-Z0-9]\b", path.read_text(encoding="utf-8")))
     assert {"RUBSCREEN_URL", "RUBSCREEN_PUBLISH", "RUBSCREEN_DATA_FOLDER"} <= names
     odd = {said.split()[0] for said in unknown_variables(dict.fromkeys(names, "x"))}
-    # The port of a dask scheduler under SLURM, which many would take for the service's, and a misspelt example.
+    # The port of a dask scheduler under SLURM, taken for the service's by many, and a misspelt example.
     assert odd <= {"RUBSCREEN_PORT", "RUBSCREEN_HOST", "RUBSCREEN_DATA_FOLDR"}
 
 
