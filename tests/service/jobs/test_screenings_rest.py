@@ -187,8 +187,11 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
         (
             {"contacts": [{"weights": {"no": 1.0}}], "bad_blades": "refuse"},
             422,
-            "blades[0].contact.weights.no",
+            "contacts[0].weights.no",
         ),
+        ({"ke_max": 1e15, "bad_blades": "refuse"}, 413, "ke_max"),
+        ({"speed_range_hz": [1e-3, 300.0], "bad_blades": "refuse"}, 413, "speed_range_hz[0]"),
+        ({"speed_range_ratio": [1e-4, 300.0], "bad_blades": "refuse"}, 422, "speed_range_ratio"),
         ({"contacts": [CONTACTS[0], CONTACTS[0]]}, 422, "contacts[1].name"),
         ({"contacts": [{"weights": {"LE": -1}}]}, 422, "contacts[0].weights.LE"),
         ({"speed_range_hz": [300.0, 100.0]}, 422, "speed_range_hz"),
@@ -215,6 +218,18 @@ def test_what_cannot_be_screened_is_refused_by_name(http, fields, status, field)
     refused = http.post("/v1/screenings", json=changed(**fields))
     assert (refused.status_code, refused.json()["field"]) == (status, field), refused.text
     assert refused.json()["remedy"]
+
+
+def test_a_contact_at_a_node_that_a_blade_has_not_is_named_with_the_blade(http):
+    contacts = [{"weights": {"LE": 1.0}}, {"name": "fifth", "weights": {"LE": 1.0, "N5": 0.5}}]
+    other = blade_to_dict(example_blade("nasa_rotor_37"))
+    other["tip_nodes"] = ["LE", *(f"M{i}" for i in range(2, 9)), "TE"]
+    asked = changed(blades=[{"example": "nasa_rotor_37"}, other], contacts=contacts, bad_blades="refuse")
+    refused = http.post("/v1/screenings", json=asked)
+    assert refused.status_code == 422, refused.text
+    problem = refused.json()
+    assert (problem["field"], problem["value"]) == ("contacts[1].weights.N5", "0.5")
+    assert problem["remedy"].startswith("for blades[1]: name a tip node of the blade: LE, M2")
 
 
 def test_a_cancelled_batch_keeps_what_it_has_and_a_retry_ends_it(http, service):
