@@ -14,6 +14,7 @@ from service.jobs.uploads import FORMS
 from service.rest.access import SUBMIT, Caller, the_caller
 from service.rest.forms.media_types import body_form
 from service.rest.job_schemas import UploadReply
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.limits import SlowBody
 from service.rest.openapi import problems
 from service.rest.routes.jobs import the_jobs
@@ -21,7 +22,7 @@ from service.rest.routes.request import the_desk
 from service.roles import Role
 from service.sizes import check_length
 
-router = APIRouter(prefix="/v1/uploads", tags=["screenings"], dependencies=[SUBMIT])
+router = APIRouter(prefix="/v1/uploads", tags=["screenings"], dependencies=[SUBMIT, KNOWN_QUERY])
 _UNNAMED = "upload"
 _FILE = {"schema": {"type": "string", "format": "binary"}}
 

@@ -120,11 +120,60 @@ def test_results_come_by_pages_filters_and_forms(http, done):
         ({"limit": "0000000019999999"}, "limit"),
         ({"offset": "100000000" + "0" * 5000}, "offset"),
         ({"meets_criteria": "maybe"}, "meets_criteria"),
+        ({"verdict": "unstable"}, "verdict"),
+        ({"verdict": ""}, "verdict"),
+        ({"contact": "le"}, "contact"),
+        ({"contact": "both"}, "contact"),
+        ({"verdct": "stable"}, "verdct"),
+        ({"limit": ["1", "2"]}, "limit"),
+        ({"": "stable"}, "query"),
     ],
 )
-def test_a_query_that_means_nothing_is_named(http, done, query, field):
-    refused = http.get(f"/v1/screenings/{done['id']}/results", params=query)
-    assert (refused.status_code, refused.json()["field"]) == (422, field)
+@pytest.mark.parametrize("form", ["application/json", "text/csv"])
+def test_a_query_that_means_nothing_is_named(http, done, query, field, form):
+    refused = http.get(f"/v1/screenings/{done['id']}/results", params=query, headers={"Accept": form})
+    assert (refused.status_code, refused.json()["field"]) == (422, field), refused.text
+
+
+def test_a_filter_that_nothing_could_fit_is_refused_with_those_that_could(http, done):
+    base = f"/v1/screenings/{done['id']}/results"
+    assert http.get(base, params={"contact": "both"}).json()["remedy"] == "give a contact of this job: LE, TE"
+    said = http.get(base, params={"verdict": "x"}).json()["remedy"]
+    assert said == "give one of stable, unstable at some speed, not decided"
+    assert (
+        http.get(base, params={"verdct": "x"}).json()["remedy"].startswith("leave it out, or give verdict:")
+    )
+    # What could fit, and nothing does, is an empty page.
+    assert http.get(base, params={"verdict": "not decided"}).json()["total"] == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/v1/screenings"),
+        ("POST", "/v1/screenings"),
+        ("GET", "/v1/screenings/{id}"),
+        ("DELETE", "/v1/screenings/{id}"),
+        ("POST", "/v1/screenings/{id}/retry"),
+        ("GET", "/v1/screenings/{id}/events"),
+        ("GET", "/v1/screenings/{id}/report"),
+        ("GET", "/v1/screenings/{id}/blades/0/map.png"),
+        ("GET", "/v1/screenings/{id}/blades/0/boundaries.png"),
+        ("GET", "/v1/trainings"),
+        ("POST", "/v1/uploads"),
+    ],
+)
+def test_a_parameter_that_a_route_of_jobs_does_not_have_is_refused(http, done, method, path):
+    asked = {"contact": "LE", "nam": "x"} if path.endswith("map.png") else {"nam": "x"}
+    refused = http.request(method, path.format(id=done["id"]), params=asked)
+    assert (refused.status_code, refused.json()["field"]) == (422, "nam"), refused.text
+    assert http.get(f"/v1/screenings/{done['id']}").json()["state"] == "done"
+
+
+def test_a_state_that_no_job_has_is_refused(http):
+    refused = http.get("/v1/screenings", params={"state": "finished"})
+    assert (refused.status_code, refused.json()["field"]) == (422, "state")
+    assert "done" in refused.json()["remedy"]
 
 
 def test_events_tell_the_way_to_the_end(http, done):
