@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import io
 import json
+import zipfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pyarrow.parquet as pq
@@ -31,8 +33,12 @@ QUESTION = {
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory) -> Iterator[ServiceProcess]:
-    data = tmp_path_factory.mktemp("data")
+def data(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="module")
+def service(data) -> Iterator[ServiceProcess]:
     with ServiceProcess(data, engine_workers=1, min_free_bytes=0, max_job_blades=50, drain_s=0) as running:
         yield running
 
@@ -222,6 +228,81 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
         assert row | {"source": ""} == other | {"source": ""}
     again = http.post("/v1/screenings", json=question)
     assert (again.status_code, again.json()["field"]) == (404, "blades[0].upload")
+
+
+ROTOR = json.dumps(blade_to_dict(example_blade("nasa_rotor_37"))).encode()
+LINES = "application/x-ndjson"
+
+
+def zipped(**files: bytes) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "status", "field"),
+    [
+        (LINES, ROTOR + b'\n{"schema": \n', 422, "night:2"),
+        (LINES, b"\n\n", 422, "night"),
+        (LINES, b'{"name": "a", "name": "b"}', 422, "night:1.name"),
+        (LINES, b"{}\n" * 51, 413, "night"),
+        ("application/json", b"[]", 422, "night"),
+        ("application/json", b"", 422, "night"),
+        ("application/json", b'[{}, {"states": [{"a": 1, "a": 2}]}]', 422, "night[1].states[0].a"),
+        ("application/json", b"\xff", 422, "night"),
+        ("application/zip", ROTOR, 422, "night"),
+        ("application/zip", zipped(**{"a.json": ROTOR})[:-30], 422, "night"),
+        ("application/zip", zipped(**{"a.txt": ROTOR}), 422, "night"),
+        ("application/zip", zipped(**{"a.json": ROTOR, "sub/b.json": b"{"}), 422, "night/sub/b.json"),
+        ("application/zip", zipped(**{"a.json": b" " * 10**7}), 413, "night/a.json"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused_when_it_has_come_and_not_kept(
+    http, data, form, content, status, field
+):
+    before = sorted((data / "uploads").iterdir())
+    refused = http.post("/v1/uploads?name=night", content=content, headers={"Content-Type": form})
+    assert (refused.status_code, refused.json()["field"]) == (status, field), refused.text
+    assert refused.json()["remedy"]
+    assert sorted((data / "uploads").iterdir()) == before
+
+
+DAMPED_BELOW_ZERO = ROTOR.replace(b'"damping_ratio": [', b'"damping_ratio": [-', 1)
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "blades", "fault"),
+    [
+        (LINES, b"\n".join([ROTOR, b"", ROTOR]), 2, None),
+        (LINES, b"\n".join([ROTOR, ROTOR, DAMPED_BELOW_ZERO, b"{}"]), 4, "night:3.damping_ratio[0]"),
+        ("application/json", ROTOR, 1, None),
+        ("application/json", b"[" + ROTOR + b", 5, {}]", 3, "night[1]"),
+        (
+            "application/zip",
+            zipped(**{"a.json": ROTOR, "b.json": DAMPED_BELOW_ZERO}),
+            2,
+            "night/b.json.damping_ratio[0]",
+        ),
+    ],
+)
+def test_a_file_is_answered_with_the_blades_in_it_and_the_first_that_cannot_be_used(
+    http, form, content, blades, fault
+):
+    sent = http.post("/v1/uploads?name=night", content=content, headers={"Content-Type": form})
+    assert sent.status_code == 201, sent.text
+    told = sent.json()
+    assert told["blades"] == blades
+    assert (told["fault"] and told["fault"]["field"]) == fault
+    order = changed(blades=[{"upload": told["id"]}], bad_blades="refuse")
+    ordered = http.post("/v1/screenings", json=order)
+    if fault is None:  # what is not told here is not refused there either
+        assert ordered.status_code == 202, ordered.text
+        http.delete(ordered.json()["links"]["self"])
+    else:
+        assert (ordered.status_code, ordered.json()["field"]) == (422, fault)
 
 
 @pytest.mark.parametrize(
