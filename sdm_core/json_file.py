@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import DamagedFile, InvalidInput
+from sdm_core.json_members import parse_json
 
 LARGEST_FILE_BYTES = 64 * 2**20
 
@@ -22,7 +23,7 @@ def read_json(path: Path, what: str) -> Any:
     Raises
     ------
     InvalidInput
-        When there is no such file, or it is over 64 MiB.
+        When there is no such file, it is over 64 MiB, or an object in it names a member twice.
     DamagedFile
         When it is not whole JSON.
     """
@@ -35,6 +36,8 @@ def read_json(path: Path, what: str) -> Any:
     except UnicodeDecodeError:
         raise DamagedFile(what, str(path), f"it is not UTF-8 text; give a JSON {what}") from None
     try:
-        return json.loads(text)
+        return parse_json(text)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path.name}: {error.field}", error.value, error.remedy) from None
     except (json.JSONDecodeError, RecursionError) as error:
         raise DamagedFile(what, str(path), f"it is not whole JSON ({error}); export it again") from None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TypedDict
@@ -12,6 +14,7 @@ from fastapi_offline import FastAPIOffline
 
 from sdm_core.version import __version__
 from service.answerer import Answerer
+from service.environment import settings_of_environment, unknown_variables
 from service.operation import logs
 from service.operation.desk_metrics import DeskMetrics
 from service.operation.draining import Draining
@@ -32,6 +35,7 @@ from service.rest.routes import (
 )
 from service.settings import Settings
 
+logger = logging.getLogger("rubscreen.service")
 DESCRIPTION = """Will this blade, rubbing its abradable liner, become unstable: at which rotor speeds, from
 which cutting stiffness on? Under `policy: auto` a surrogate answers where it is sure and inside its domain,
 the exact core elsewhere; every point says which, and why."""
@@ -64,9 +68,13 @@ def create_app(
     Raises
     ------
     InvalidInput
-        When traces are asked for and cannot be sent.
+        When a setting of the environment cannot be used, or traces are asked for and cannot be sent.
     """
-    settings, draining = settings or Settings(), draining or Draining()
+    if settings is None:
+        settings = settings_of_environment()
+        for warning in unknown_variables(os.environ):  # `rubscreen serve` has said so itself
+            logger.warning(warning)
+    draining = draining or Draining()
     counts = Metrics()
     tracing = None if settings.otel_endpoint is None else Tracing(settings.otel_endpoint)
 

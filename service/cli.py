@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated, Any
 
 import typer
@@ -29,6 +30,7 @@ from service.commands import (
     trainings,
     verify,
 )
+from service.environment import unknown_variables
 
 
 class _Commands(TyperGroup):
@@ -72,6 +74,8 @@ def rubscreen(
     ] = False,
 ) -> None:
     """Screen turbomachinery blades for rub-induced instability."""
+    for warning in unknown_variables(os.environ):
+        typer.echo(f"rubscreen: warning: {warning}", err=True)
 
 
 for command in (

@@ -7,11 +7,17 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le
+from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 Count = Annotated[int, Gt(0)]
 Seconds = Annotated[float, Gt(0)]
 Ratio = Annotated[float, Gt(0)]
+
+
+def cores() -> int:
+    """Of this machine."""
+    return os.cpu_count() or 1
 
 
 class Settings(BaseSettings):
@@ -26,7 +32,8 @@ class Settings(BaseSettings):
     served_answers_folder
         Where exact answers are kept for retraining; None keeps none.
     data_folder
-        Where jobs, uploads and the database are; None runs no jobs and keeps no keys.
+        Where jobs, uploads and the database are; None runs no jobs and keeps no keys. The command line puts
+        ``~/.local/share/rubscreen`` in the place of None.
     database_url
         ``postgresql://USER:PASSWORD@HOST/DATABASE``, which several replicas may share; None is SQLite in the
         data folder.
@@ -47,7 +54,7 @@ class Settings(BaseSettings):
     jobs_at_once
         Screenings this process runs at the same time; they share its workers by priority.
     job_lease_s
-        Time after which the jobs of a replica that says nothing any more are taken over.
+        Time after which the jobs of a replica that says nothing any more are taken over, s.
     engine_workers
         Processes that compute the chunks of jobs, where there is no `scheduler`.
     scheduler
@@ -57,11 +64,11 @@ class Settings(BaseSettings):
     min_free_bytes
         Room left free on the data folder's disk: jobs wait, and new ones are refused, before it is used up.
     max_upload_bytes
-        Of one file of blades.
+        Size of one file of blades.
     max_job_blades
-        Of one screening.
+        Blades of one screening.
     max_job_contacts
-        Of one screening.
+        Contacts of one screening.
     max_job_results
         Blades times contacts of one screening.
     keep_jobs_days, keep_uploads_days
@@ -69,13 +76,13 @@ class Settings(BaseSettings):
     max_body_bytes
         Largest request body; longer ones are refused while they arrive.
     body_timeout_s
-        Time a client has to send a whole body.
+        Time a client has to send a whole body, and each part of an upload, s.
     max_points
         Points of one stability request, and speeds times stiffnesses of one map.
     max_boundary_speeds
         Speeds of one boundary request.
     max_modes, max_tip_nodes, max_states
-        Size of a blade.
+        Largest blade that is taken.
     max_mesh_nodes
         Nodes of the mesh of a profile to be built.
     max_arcs
@@ -93,20 +100,20 @@ class Settings(BaseSettings):
     max_waiting
         Requests that may wait; one more is told to come back (503).
     deadline_s
-        Time the computation of one answer may take.
+        Time the computation of one answer may take, s.
     shutdown_s
-        Time the requests being answered have to finish when the service is asked to stop.
+        Time the requests being answered have to finish when the service is asked to stop, s.
     drain_s
         How long the service goes on answering after SIGTERM while it says that it is not ready, s; 0 stops
         at once. Longer than a balancer takes to notice.
     audit_share_of_time
-        Of one core, for re-solving confident answers exactly in the background; 0 audits nothing.
+        Share of one core for re-solving confident answers exactly in the background; 0 audits nothing.
     audit_points_per_request
         Confident answers drawn for that from each request at most; 0 audits nothing.
     otel_endpoint
         OTLP collector (HTTP) that spans are sent to; None sends none.
     log_level
-        Of the loggers under ``rubscreen``, access log included.
+        Least level of lines from the loggers under ``rubscreen``, access log included.
     log_format
         ``json`` lines or ``text``; ``auto`` is text on a terminal.
 
@@ -131,7 +138,7 @@ class Settings(BaseSettings):
     run_jobs: bool = True
     jobs_at_once: Count = 4
     job_lease_s: Seconds = 30.0
-    engine_workers: Count = os.cpu_count() or 1
+    engine_workers: Count = Field(default_factory=cores)
     scheduler: str | None = None
     scheduler_tls_ca: Path | None = None
     scheduler_tls_cert: Path | None = None
@@ -156,7 +163,7 @@ class Settings(BaseSettings):
     max_frequency_span: Ratio = 1e4
     max_contact_ratio: Ratio = 10.0
     max_name_length: Count = 200
-    worker_threads: Count = os.cpu_count() or 1
+    worker_threads: Count = Field(default_factory=cores)
     max_waiting: Count = 64
     deadline_s: Seconds = 300.0
     shutdown_s: Count = 30

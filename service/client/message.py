@@ -17,6 +17,7 @@ from service.client.file_body import FileBody
 from service.client.problem import ServiceProblem
 from service.rest import replies
 from service.rest.forms.media_types import JSON
+from service.service_url import checked_service_url
 
 Json = dict[str, Any]
 T = TypeVar("T")
@@ -118,7 +119,7 @@ class Address:
     Raises
     ------
     InvalidInput
-        For a key that no header can carry; it is not repeated.
+        For an address that no service can have, or a key that no header can carry; the key is not repeated.
     """
 
     base_url: str
@@ -136,7 +137,7 @@ class Address:
         The line break of the file a key came from is left out.
         """
         given = os.environ.get(KEY_VARIABLE) if key is None else key
-        return cls(base_url.rstrip("/"), (given or "").strip() or None)
+        return cls(checked_service_url(base_url), (given or "").strip() or None)
 
     def listening(self, step: Listening) -> Json:
         """Arguments of the HTTP client's `stream`."""

@@ -27,6 +27,7 @@ INLINE_BYTES = 2 * 2**20
 # Of one upload: small enough to be held and sent again, far below what the service takes.
 PIECE_BYTES = 64 * 2**20
 _OF_ORDER = re.compile(r"blades\[(?P<entry>\d+)\]")
+_FOR = re.compile(r"for (?P<source>\S+): ")
 _OF_PIECE = re.compile(r"blades(?:-(?P<first>\d+))?\.ndjson:(?P<line>\d+)")
 
 
@@ -147,16 +148,25 @@ def _body_too_long(problem: ServiceProblem) -> bool:
 
 
 def _placed(problem: ServiceProblem, firsts: Sequence[int]) -> ServiceProblem:
-    """A refusal that names a line of a piece, or an entry as sent, as one that names that of `blades`."""
-    field = str(problem.problem.get("field", ""))
-    line, entry = _OF_PIECE.match(field), _OF_ORDER.match(field)
+    """A refusal that names a line of a piece, or an entry as sent, as one that names that of `blades`.
+
+    The remedy of a field of the order itself may begin with the blade that it does not fit.
+    """
+    told = dict(problem.problem)
+    field, remedy = str(told.get("field", "")), str(told.get("remedy", ""))
+    source = _FOR.match(remedy)
+    found = field if source is None else source["source"]
+    line, entry = _OF_PIECE.match(found), _OF_ORDER.match(found)
     if line is not None:
         place, end = int(line["first"] or 0) + int(line["line"]) - 1, line.end()
     elif entry is not None and int(entry["entry"]) < len(firsts):
         place, end = firsts[int(entry["entry"])], entry.end()
     else:
         return problem
-    where = f"blades[{place}]{field[end:]}"
-    said = str(problem.problem.get("detail", "")).replace(field, where, 1)
-    told = problem.problem | {"field": where, "detail": said}
+    where = f"blades[{place}]{found[end:]}"
+    told["detail"] = str(told.get("detail", "")).replace(found, where, 1)
+    if source is None:
+        told["field"] = where
+    else:
+        told["remedy"] = remedy.replace(found, where, 1)
     return ServiceProblem(told, problem.temporary, problem.retry_after_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from sdm_core.errors import InvalidInput
 from service.client.conversations import one
 from service.client.file_body import FileBody
 from service.client.message import Conversation, Message
+from service.field_values import nearest
 from service.rest import replies
 from service.rest.job_schemas import UploadReply
 
@@ -26,6 +28,7 @@ FORMS = {
     ".zip": "application/zip",
 }
 LINES = FORMS[".ndjson"]
+_UPLOAD_ID = re.compile(r"[0-9a-f]{32}")
 BladeLike = Blade | BladeProfile | Mapping[str, Any] | UploadReply | str
 """A blade, a profile, either as a document, an upload (or its id), or the name of a shipped example."""
 _WHAT = "give a Blade, a BladeProfile, a document, an upload or its id, or an example"
@@ -61,8 +64,7 @@ def entry_of(blade: BladeLike, place: int) -> Entry:
     if isinstance(blade, UploadReply):
         return Entry(replies.to_json({"upload": blade.id}), False)
     if isinstance(blade, str):
-        name = {"example": blade} if blade in EXAMPLES else {"upload": blade}
-        return Entry(replies.to_json(name), False)
+        return Entry(replies.to_json(_named(blade, field)), False)
     if not isinstance(blade, Mapping):
         raise InvalidInput(field, type(blade).__name__, _WHAT)
     try:
@@ -70,6 +72,32 @@ def entry_of(blade: BladeLike, place: int) -> Entry:
     except TypeError as error:
         raise InvalidInput(field, type(blade).__name__, f"give what JSON can hold ({error})") from None
     return Entry(content, not ("upload" in blade or "example" in blade))
+
+
+def _named(name: str, field: str) -> dict[str, str]:
+    """An example or an upload by its name; what can be neither is not asked the service for.
+
+    Raises
+    ------
+    InvalidInput
+        With what was probably meant.
+    """
+    if name in EXAMPLES:
+        return {"example": name}
+    if _UPLOAD_ID.fullmatch(name):
+        return {"upload": name}
+    meant = nearest(name, list(EXAMPLES))
+    if Path(name).suffix.lower() in FORMS or "/" in name or "\\" in name:
+        remedy = (
+            "a file is read first, read_blade(path) or read_profile(path), or sent ahead, client.upload(path)"
+        )
+    elif meant is not None:
+        remedy = f"is the example {meant} meant?"
+    else:
+        remedy = (
+            f"a text names an example ({', '.join(EXAMPLES)}) or is the id of an upload, 32 digits 0-9a-f"
+        )
+    raise InvalidInput(field, name, remedy)
 
 
 def upload(

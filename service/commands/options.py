@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 CONTACT, OUTPUT, ANSWERS = "Contact", "Output", "Where answers come from"
+URL_VARIABLE = "RUBSCREEN_URL"
 LOCAL_SERVICE = "http://127.0.0.1:8000"
+
+
+def _checked_url(ctx: typer.Context, url: str | None) -> str | None:
+    if url is None:
+        return None
+    from service.service_url import checked_service_url
+
+    typed = ctx.get_parameter_source("url")
+    return checked_service_url(url, "--url" if typed is None or typed.name != "ENVIRONMENT" else URL_VARIABLE)
 
 
 class Policy(StrEnum):
@@ -100,6 +110,7 @@ UrlOption = Annotated[
     typer.Option(
         metavar="URL",
         help="Ask a running service, e.g. http://127.0.0.1:8000, instead of answering in this process.",
+        callback=_checked_url,
         rich_help_panel=ANSWERS,
         show_default=False,
     ),
@@ -107,7 +118,12 @@ UrlOption = Annotated[
 ServiceOption = Annotated[
     str,
     typer.Option(
-        "--url", metavar="URL", envvar="RUBSCREEN_URL", help="The running service.", rich_help_panel=ANSWERS
+        "--url",
+        metavar="URL",
+        envvar=URL_VARIABLE,
+        help="The running service.",
+        rich_help_panel=ANSWERS,
+        callback=_checked_url,
     ),
 ]
 ModelsOption = Annotated[

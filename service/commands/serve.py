@@ -116,21 +116,14 @@ def settings_from(
     InvalidInput
         Naming the environment variable that cannot be used.
     """
-    from pydantic import ValidationError
-
-    from sdm_core.errors import InvalidInput
-    from service.settings import Settings, default_data_folder
+    from service.environment import settings_of_environment
+    from service.settings import default_data_folder
 
     folders = {"models_folder": models, "served_answers_folder": keep_answers, "data_folder": data}
     given: dict[str, Any] = {name: Path(folder) for name, folder in folders.items() if folder is not None}
     if database_url is not None:
         given["database_url"] = database_url
-    try:
-        settings = Settings(**given)
-    except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        name = "RUBSCREEN_" + "_".join(str(part) for part in fault["loc"]).upper()
-        raise InvalidInput(name, fault["input"], fault["msg"]) from None
+    settings = settings_of_environment(**given)
     if settings.data_folder is None:
         settings = settings.model_copy(update={"data_folder": default_data_folder()})
     return settings

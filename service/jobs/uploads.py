@@ -16,6 +16,7 @@ from typing import Any
 
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
+from sdm_core.json_members import parse_json
 from service.jobs.durable_files import INCOMING, check_room, remove_folder, sync_folder, write_durably
 from service.jobs.errors import DamagedUpload, NoSuchUpload, UploadTooLarge
 
@@ -84,8 +85,8 @@ class UploadWriter:
         self._digest.update(part)
         self._file.write(part)
 
-    def finish(self, name: str, form: str, owner: str | None) -> Upload:
-        """All of it has come: it is on the disk when this returns, once however often it was sent.
+    def whole(self, name: str, form: str, owner: str | None) -> Upload:
+        """All of it has come and is on the disk; it is nobody's upload before it is kept.
 
         Raises
         ------
@@ -96,7 +97,19 @@ class UploadWriter:
         self._file.close()
         digest = self._digest.hexdigest()
         told = json.dumps([name, form, self._size, digest, owner])
-        upload = Upload(hashlib.sha256(told.encode()).hexdigest()[:32], name, form, self._size, digest, owner)
+        return Upload(hashlib.sha256(told.encode()).hexdigest()[:32], name, form, self._size, digest, owner)
+
+    def documents(self, upload: Upload, most: int) -> Iterator[tuple[str, Any]]:
+        """What has come, as `Uploads.documents`."""
+        return _documents(self._beside / _CONTENT, upload, most)
+
+    def keep(self, upload: Upload) -> None:
+        """Make it an upload, once however often it was sent.
+
+        Raises
+        ------
+        OSError
+        """
         write_durably(self._beside / _ABOUT, json.dumps(asdict(upload)).encode())
         place = self._folder / upload.id
         try:
@@ -111,7 +124,6 @@ class UploadWriter:
         else:
             remove_folder(self._beside)
         sync_folder(self._folder)
-        return upload
 
     def abandon(self) -> None:
         """Remove what has come."""
@@ -180,13 +192,8 @@ class Uploads:
         NoSuchUpload
             When it was deleted meanwhile.
         """
-        path = self._folder / upload.id / _CONTENT
-        read = {JSON: _of_json, LINES: _of_lines, ZIP: _of_zip}[upload.form]
         try:
-            for count, (source, document) in enumerate(read(path, upload), 1):
-                if count > most:
-                    raise UploadTooLarge(upload.name, f"more than {most} blades", "split the file")
-                yield source, document
+            yield from _documents(self._folder / upload.id / _CONTENT, upload, most)
         except FileNotFoundError:
             raise NoSuchUpload("upload", upload.id, "send the file again: it was just deleted") from None
 
@@ -211,6 +218,14 @@ def _came_before(upload: Path, before: datetime) -> bool:
         return (upload / _ABOUT).stat().st_mtime < before.timestamp()
     except FileNotFoundError:  # its sender deletes it just now
         return False
+
+
+def _documents(path: Path, upload: Upload, most: int) -> Iterator[tuple[str, Any]]:
+    read = {JSON: _of_json, LINES: _of_lines, ZIP: _of_zip}[upload.form]
+    for count, (source, document) in enumerate(read(path, upload), 1):
+        if count > most:
+            raise UploadTooLarge(upload.name, f"more than {most} blades", "split the file")
+        yield source, document
 
 
 def _of_json(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
@@ -266,7 +281,9 @@ def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
 
 def _parsed(content: bytes, where: str) -> Any:
     try:
-        return json.loads(content)
+        return parse_json(content)
+    except InvalidInput as error:
+        raise error.under(where) from None
     except (ValueError, RecursionError) as error:
         said = str(error) or "nested too deep"
         raise DamagedUpload(where, f"{len(content)} bytes", f"give JSON in UTF-8 ({said})") from None

@@ -19,7 +19,7 @@ from service.jobs.job_folder import REQUEST
 from service.jobs.jobs import Jobs
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
-from service.jobs.screening.checks import blades_per_chunk, check_line
+from service.jobs.screening.checks import blades_per_chunk, check_line, under_source
 from service.jobs.screening.request import ScreeningRequest
 from service.jobs.training.request import TrainingRequest
 from service.jobs.uploads import Uploads
@@ -138,7 +138,7 @@ def _lines(
             check_line(line, request, settings)
         except InvalidInput as error:
             if ask.bad_blades == "refuse":
-                raise error.under(source) from None
+                raise under_source(error, source) from None
             # Noted again when it runs; what is no blade is not kept, however large.
             kept = isinstance(document, dict) and len(json.dumps(document)) <= _SMALL
             line = BladeLine(index, source, document if kept else {})

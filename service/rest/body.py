@@ -9,6 +9,7 @@ import anyio
 from starlette.requests import Request
 
 from sdm_core.errors import InvalidInput
+from sdm_core.json_members import parse_json
 from service.rest.limits import SlowBody
 from service.settings import Settings
 from service.sizes import TooLarge
@@ -53,7 +54,8 @@ def parsed(body: bytes) -> Any:
     Raises
     ------
     InvalidInput
-        When it is not one whole JSON value in UTF-8, or is nested deeper than any question.
+        When it is not one whole JSON value in UTF-8, names a member of an object twice, or is nested deeper
+        than any question.
 
     Examples
     --------
@@ -66,7 +68,9 @@ def parsed(body: bytes) -> Any:
         found = f"byte {body[error.start]:#04x} at {error.start}"
         raise InvalidInput("body", found, "send JSON as UTF-8, not compressed") from None
     try:
-        data = json.loads(text)
+        data = parse_json(text)
+    except InvalidInput:
+        raise
     except json.JSONDecodeError as error:
         raise _not_json(text, error) from None
     except RecursionError:

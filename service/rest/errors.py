@@ -194,12 +194,18 @@ def _answer_invalid(request: Request, error: Exception) -> Response:
 
 
 def _answer_unreadable(request: Request, error: Exception) -> Response:
-    """A parameter of path, query or header that FastAPI itself could not read."""
+    """A parameter of path, query or header that FastAPI itself could not read.
+
+    Each is declared as text, which any text is: it can only be missing.
+    """
     assert isinstance(error, RequestValidationError)
     fault = error.errors()[0]
-    missing = fault["type"] == "missing"
-    field = ".".join(str(part) for part in fault["loc"][1:]) or "request"
-    found = InvalidInput(field, "missing" if missing else fault["input"], str(fault["msg"]))
+    where, *names = (str(part) for part in fault["loc"])
+    field = ".".join(names) or "request"
+    if fault["type"] == "missing":
+        found = InvalidInput(field, "missing", f"give it in the {where}; /docs shows what it may be")
+    else:
+        found = InvalidInput(field, fault["input"], "see /docs for what it may be")
     return problem_of(found, request.scope)
 
 

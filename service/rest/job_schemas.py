@@ -22,7 +22,7 @@ class ProgressReply(BaseModel):
 
 
 class JobFault(BaseModel):
-    """Why a job failed."""
+    """Why a job failed, or what is wrong with a blade of an upload."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -128,6 +128,13 @@ class UploadReply(BaseModel):
     form: str
     size_bytes: int
     sha256: str
+    # An older service does not say them.
+    blades: int | None = Field(None, description="In it, those that cannot be used among them.")
+    fault: JobFault | None = Field(
+        None,
+        description="The first that cannot be used, among the first thousand: a screening refuses it, or "
+        "skips it if told so. null where all of these can.",
+    )
 
 
 class TrainedReply(BaseModel):

@@ -70,17 +70,24 @@ class WorkQueue:
         if (waiting := self.waiting) >= self._max_waiting:
             raise Busy("service", f"{waiting} requests waiting", "send the request again later")
 
-    async def run(self, work: Callable[[], T], request: Request) -> T:
+    async def run(self, work: Callable[[], T], request: Request, *, turn_away: bool = True) -> T:
         """The outcome of `work`, from a thread.
+
+        Parameters
+        ----------
+        turn_away
+            Whether it is refused when as many calls wait as may.
 
         Raises
         ------
+        Busy
         TooMuchWork
             When the time is up.
         Cancelled
             When the client has gone or the service closes.
         """
-        self.check_room()
+        if turn_away:
+            self.check_room()
         gone = Event()
 
         def stop_at(end: float) -> Callable[[], None]:

@@ -19,6 +19,7 @@ from service.rest.access import guarded_routes, needed
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.forms.media_types import ARROW, NPZ
+from service.rest.known_query import routes_of_known_query
 from service.rest.model_schemas import PromotionQuestion
 from service.rest.profile_schema import PROFILE
 from service.rest.question_schemas import BLADE, CONTACT
@@ -87,6 +88,7 @@ def install(app: FastAPI) -> None:
             document = generate()
             document["components"]["schemas"] |= _components()
             _guards(app, document)
+            _known_queries(app, document)
             _own_422(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
@@ -104,6 +106,15 @@ def _guards(app: FastAPI, document: Json) -> None:
             operation["description"] = f"{operation.get('description', '')}\n\nNeeds {needed(role)}.".strip()
             refusals = {str(status): problem for status, problem in problems(401, 403, 429).items()}
             operation["responses"] = dict(sorted((refusals | operation["responses"]).items()))
+
+
+def _known_queries(app: FastAPI, document: Json) -> None:
+    """Every route that refuses parameters it does not have may answer 422."""
+    for route in routes_of_known_query(app.routes):
+        for method in route.methods if route.include_in_schema else ():
+            operation = document["paths"][route.path_format][method.lower()]
+            refusal = {"422": problems(422)[422]}
+            operation["responses"] = dict(sorted((refusal | operation["responses"]).items()))
 
 
 def _own_422(document: Json) -> None:

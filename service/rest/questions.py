@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
@@ -22,6 +21,7 @@ from sdm_core.blade_sensitivity import check_differentiable
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
+from service.field_values import nearest, remedy_for
 from service.rest.known_blades import KnownBlades
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
@@ -29,6 +29,7 @@ from service.sizes import TooLarge, check_blade_size, check_length, check_reach
 from training.answers import POLICIES
 
 Asked = TypeVar("Asked", bound=BaseModel)
+_LONGEST_NAME = 100  # characters of a field's name, in a refusal
 
 # A design tool asks about one blade again and again: reading it costs as much as answering does.
 _KNOWN_BLADES = KnownBlades()
@@ -209,18 +210,20 @@ def read_question(kind: type[Asked], data: Any, settings: Settings) -> Asked:
     try:
         return kind.model_validate(data, context=settings)
     except ValidationError as error:
-        raise _first_fault(error, list(kind.model_fields)) from None
+        raise _first_fault(error, kind) from None
 
 
-def _first_fault(error: ValidationError, known: Sequence[str]) -> InvalidInput:
+def _first_fault(error: ValidationError, kind: type[BaseModel]) -> InvalidInput:
     """The first of pydantic's findings as the core would have said it."""
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")
     if isinstance(cause, InvalidInput):
         return cause
-    field = ".".join(str(part) for part in fault["loc"])
+    field, known = str(fault["loc"][0])[:_LONGEST_NAME], ", ".join(kind.model_fields)
     if fault["type"] == "missing":
-        return InvalidInput(field, "missing", f"give {field}; the fields are {', '.join(known)}")
+        return InvalidInput(field, "missing", f"give {field}; the fields are {known}")
     if fault["type"] == "extra_forbidden":
-        return InvalidInput(field, fault["input"], f"leave it out: the fields are {', '.join(known)}")
-    return InvalidInput(field, fault["input"], fault["msg"])
+        meant = nearest(field, list(kind.model_fields))
+        instead = "leave it out" if meant is None else f"leave it out, or give {meant}"
+        return InvalidInput(field, fault["input"], f"{instead}: the fields are {known}")
+    return InvalidInput(field, fault["input"], remedy_for(kind.model_fields[field]))

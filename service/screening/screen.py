@@ -23,6 +23,8 @@ KE_MAX = 2.5e4
 # With smooth engagement the exact core answers every point of a map, at some hundredths of a second each.
 MAP_SHAPE, MAP_SHAPE_SMOOTH = (100, 100), (50, 50)
 STABLE, UNSTABLE, UNDECIDED = "stable", "unstable at some speed", "not decided"
+VERDICTS = (STABLE, UNSTABLE, UNDECIDED)
+USUAL_CONTACTS = ("LE", "TE", "both")
 
 
 @dataclass(frozen=True)
@@ -146,10 +148,11 @@ def default_contacts(blade: Blade) -> dict[str, ContactConfiguration]:
     first, last = blade.tip_nodes[0], blade.tip_nodes[-1]
     if first == last:
         return {first: ContactConfiguration.at(first)}
+    leading, trailing, both = USUAL_CONTACTS
     return {
-        "LE": ContactConfiguration.at(first),
-        "TE": ContactConfiguration.at(last),
-        "both": ContactConfiguration.at(first, last),
+        leading: ContactConfiguration.at(first),
+        trailing: ContactConfiguration.at(last),
+        both: ContactConfiguration.at(first, last),
     }
 
 

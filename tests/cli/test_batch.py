@@ -112,7 +112,7 @@ def test_ctrl_c_leaves_the_job_running_and_says_how_to_watch_it_again(rubscreen,
         (("submit", "nasa_rotor_37", "--weights", "chord"), "--weights = chord"),
         (("submit", "nasa_rotor_37", "--speed", "100Hz:0.3ratio"), "--speed = 100Hz:0.3ratio"),
         (("submit", "nasa_rotor_37", "--csv", "x.csv"), "--csv = x.csv: give --wait too"),
-        (("submit", "nasa_rotor_37", "--nodes", "XX"), "blades[0].contact.weights.XX"),
+        (("submit", "nasa_rotor_37", "--nodes", "XX"), "contacts[0].weights.XX = 1.0: for blades[0]: "),
         (
             ("submit", "nasa_rotor_37", "--least-margin", "0.2"),
             "criteria.least_margin = 0.2: give ke_liner too",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 
 import numpy as np
 import pyarrow as pa
@@ -118,6 +119,15 @@ def test_an_array_given_twice_is_refused(http, question, problem):
     rest = question() | {"ke": [1.0, 1.0]}
     body = to_npz(question(), question=np.array(json.dumps({k: rest[k] for k in ("blade", "contact", "ke")})))
     assert problem(ask(http, NPZ, body), 422, "ke")["value"] == "given twice"
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name:UserWarning")
+def test_an_npz_with_two_arrays_of_one_name_is_refused(http, question, problem):
+    first, second = io.BytesIO(to_npz(question())), io.BytesIO()
+    np.save(second, np.array([100.0]))
+    with zipfile.ZipFile(first, "a") as archive:
+        archive.writestr("speed_hz.npy", second.getvalue())
+    assert problem(ask(http, NPZ, first.getvalue()), 422, "speed_hz")["value"] == "two arrays of one name"
 
 
 @pytest.mark.parametrize(

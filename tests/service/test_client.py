@@ -116,12 +116,6 @@ def test_no_service_is_a_problem_that_names_the_address():
     assert refused.value.problem["status"] is None
 
 
-@pytest.mark.parametrize("url", ["127.0.0.1:8000", "ftp://127.0.0.1", "http://[", ""])
-def test_an_address_that_is_none_is_a_problem(url):
-    with Client(url, timeout=2.0, patience=ONCE) as client, pytest.raises(ServiceProblem):
-        client.models()
-
-
 @pytest.mark.parametrize(
     ("status", "body"), [(502, b"<html>bad gateway</html>"), (200, b"<html>hello</html>"), (200, b"{}")]
 )

@@ -215,6 +215,25 @@ def test_the_key_of_an_order_is_the_callers_where_it_has_one(ask):
     assert [request.headers["Idempotency-Key"] for request in service.asked] == ["night 1", "sunday"]
 
 
+@pytest.mark.parametrize(
+    ("named", "remedy"),
+    [
+        ("nope", "32 digits"),
+        ("", "nasa_rotor_37, generic_compressor_blade"),
+        ("nasa_rotor37", "is the example nasa_rotor_37 meant?"),
+        ("blade.json", "read_blade(path)"),
+        ("blades/first", "client.upload(path)"),
+        ("A" * 32, "0-9a-f"),
+    ],
+)
+def test_a_text_that_names_no_blade_is_refused_before_anything_is_sent(ask, named, remedy):
+    service = Service(screenings=[document()])
+    with pytest.raises(InvalidInput) as refused:
+        ask(service, lambda client: client.submit_screening([BLADE, named]))
+    assert refused.value.field == "blades[1]" and remedy in refused.value.remedy
+    assert service.asked == []
+
+
 def test_a_retry_whose_answer_is_lost_is_acted_on_once(ask):
     service = Service(retry=[CUT], job=[document(State.FAILED), document(State.QUEUED, attempt=2)])
     assert ask(service, lambda client: client.retry("a" * 32)).attempt == 2

@@ -221,10 +221,11 @@ def test_the_whole_stack_screens_a_blade_for_who_has_a_key_and_for_nobody_else(s
             time.sleep(0.2)
         assert client.get(f"{where}/results").json()["total"] == 1
         # A file larger than the body of a question may be.
-        file = {"content": b" " * (65 * 2**20) + b"[]", "headers": {"Content-Type": "application/json"}}
+        lines = (b" " * 2**24 + b"\n") * 4 + b" " * 2**20 + b'{"name": "none"}'
+        file = {"content": lines, "headers": {"Content-Type": "application/x-ndjson"}}
         upload = client.post("/v1/uploads", **file)
         assert upload.status_code == 201, upload.text
-        assert upload.json()["size_bytes"] == len(file["content"])
+        assert (upload.json()["size_bytes"], upload.json()["blades"]) == (len(lines), 1)
     # By the worker, not by one of a replica's own.
     assert not (made.folder / "data" / "scratch").exists()
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import time
 from collections.abc import Iterator
 
+import anyio
 import httpx
 import pytest
+from starlette.requests import Request
 
 from service.app import create_app
+from service.rest.limits import Busy, WorkQueue
 from service.settings import Settings
 
 LIMITS = Settings(
@@ -145,3 +149,17 @@ def test_a_body_that_never_ends_is_given_up(small, problem):
     else:
         problem(answer, 408, "body")
     assert small.get("/healthz").status_code == 200
+
+
+def test_whose_work_is_not_to_be_turned_away_has_it_done_though_nobody_may_wait():
+    async def never() -> dict[str, str]:
+        await anyio.sleep_forever()
+        raise AssertionError
+
+    async def both() -> int:
+        queue, request = WorkQueue(1, 0, 10.0), Request({"type": "http"}, never)
+        with pytest.raises(Busy):
+            await queue.run(lambda: 1, request)
+        return await queue.run(lambda: 2, request, turn_away=False)
+
+    assert asyncio.run(both()) == 2

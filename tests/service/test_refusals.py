@@ -187,6 +187,18 @@ def test_a_body_that_is_not_one_json_object_is_refused(http, problem, path, name
     assert found in problem(http.post(path, content=body), 422, "body")["value"]
 
 
+@pytest.mark.parametrize("place", ["speed_hz", "blade.damping_ratio", "blade.states[0].speed_hz"])
+def test_a_member_named_twice_is_refused_and_not_left_to_chance(http, question, problem, place):
+    name = place.rpartition(".")[2]
+    body = json.dumps(question())
+    if place == "speed_hz":
+        body = body[:-1] + ', "speed_hz": [100.0]}'
+    else:
+        body = body.replace(f'"{name}":', f'"{name}": 0.5, "{name}":', 1)
+    document = problem(http.post("/v1/stability", content=body), 422, place)
+    assert document["value"] == "given twice"
+
+
 def test_a_byte_order_mark_and_any_content_type_are_no_obstacle(http, question):
     body = b"\xef\xbb\xbf" + json.dumps(question()).encode()
     assert http.post("/v1/stability", content=body, headers={"Content-Type": "text/plain"}).status_code == 200

@@ -12,13 +12,12 @@ from typing import Any
 
 from sdm_core.errors import RubscreenError
 from service.jobs.screening.blade_lines import BladeLine
-from service.jobs.screening.checks import check_line
+from service.jobs.screening.checks import check_fit, check_line
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade, UnscreenedBlade
 from service.jobs.screening.request import ScreeningRequest
 from service.screening.batch import Failure
 from service.screening.screen import screen
 from service.settings import Settings
-from service.sizes import check_reach
 from training.registry import SHIPPED
 from training.screening import Screener
 
@@ -73,9 +72,8 @@ def _screened(
 ) -> ScreenedBlade:
     check_line(line, request, limits)
     blade = line.blade()
-    ends, contacts = request.check(blade)
-    for contact in contacts:
-        check_reach(blade, contact, ends, "ke_max", request.ke_max, limits)
+    if line.profile:  # its modes are known only now
+        check_fit(blade, request, limits)
     report = screen(
         [blade],
         request.contacts_of(blade),

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
 from service.screening.screen import KE_MAX, default_contacts
@@ -113,20 +111,16 @@ class ScreeningRequest:
         low, high = (Speed(value, self.speed_unit) for value in self.speed_range)
         return SpeedRange(low, high, f"speed_range_{self.speed_unit.lower()}")
 
-    def check(self, blade: Blade) -> tuple[np.ndarray, list[ContactConfiguration]]:
-        """The ends of a blade's speed range, Hz, and its contacts, where they fit it.
+    def range_of(self, blade: Blade) -> tuple[float, float]:
+        """The ends of a blade's speed range, Hz.
 
         Raises
         ------
-        InvalidInput
-            Naming what does not.
+        InvalidInput, OutOfSpeedRange
+            When the range does not fit it, or none is given and it has no usual one.
         """
         asked = self.speeds()
-        ends = operating_range(blade) if asked is None else asked.for_blade(blade)
-        contacts = list(self.contacts_of(blade).values())
-        for contact in contacts:
-            contact.weight_vector(blade.tip_nodes)
-        return np.array(ends), contacts
+        return operating_range(blade) if asked is None else asked.for_blade(blade)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""

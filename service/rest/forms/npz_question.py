@@ -82,20 +82,22 @@ def _arrays(body: bytes, most_bytes: int) -> dict[str, np.ndarray]:
         if total > most_bytes:
             found = f"an npz of {total} bytes when unpacked"
             raise TooLarge("body", found, f"send at most {most_bytes} bytes: split the request")
-        return {
-            member.filename.removesuffix(".npy"): _array(archive, member)
-            for member in members
-            if _is_array(member)
-        }
+        arrays: dict[str, np.ndarray] = {}
+        for member in members:
+            name = _name_of(member)
+            if name in arrays:
+                raise InvalidInput(name[:100], "two arrays of one name", "give each array once")
+            arrays[name] = _array(archive, member)
+        return arrays
 
 
-def _is_array(member: zipfile.ZipInfo) -> bool:
+def _name_of(member: zipfile.ZipInfo) -> str:
     name = member.filename
     if not name.endswith(".npy") or member.compress_type not in _COMPRESSIONS or member.flag_bits & 1:
         raise InvalidInput(
             "body", f"a member {name[:100]!r}", f"{_REMEDY}, neither encrypted nor of bzip2 or lzma"
         )
-    return True
+    return name.removesuffix(".npy")
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Annotated
 from urllib.parse import urlencode
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Query
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
@@ -26,6 +27,7 @@ from service.rest.access import READ, SUBMIT, the_caller
 from service.rest.body import parsed
 from service.rest.forms.media_types import JSON
 from service.rest.job_schemas import JobReply, JobsReply, ResultsReply
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.negotiation import best_form
 from service.rest.openapi import problems, request_body
 from service.rest.routes.jobs import (
@@ -39,13 +41,14 @@ from service.rest.routes.jobs import (
 )
 from service.rest.routes.request import TheJson, the_desk
 from service.rest.screening_question import SCREENING_EXAMPLE, ScreeningQuestion
+from service.screening.screen import USUAL_CONTACTS, VERDICTS
 
 CSV, PARQUET, HTML, PNG = "text/csv", "application/vnd.apache.parquet", "text/html", "image/png"
 MOST_ROWS = 1000
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _VARY = {"Vary": "Accept"}
 
-router = APIRouter(prefix="/v1/screenings", tags=["screenings"])
+router = APIRouter(prefix="/v1/screenings", tags=["screenings"], dependencies=[KNOWN_QUERY])
 
 
 @router.post(
@@ -146,9 +149,9 @@ async def screening_results(
     job_id: str,
     offset: str | None = None,
     limit: str | None = None,
-    contact: str | None = None,
-    verdict: str | None = None,
-    meets_criteria: str | None = None,
+    contact: Annotated[str | None, Query(description="A contact of the job, by its name.")] = None,
+    verdict: Annotated[str | None, Query(description=f"One of: {', '.join(VERDICTS)}.")] = None,
+    meets_criteria: Annotated[str | None, Query(description="true or false.")] = None,
 ) -> Response:
     """The ranking, safest first: JSON by pages, CSV or Parquet whole; of what is there while the job runs."""
     desk, service = the_jobs(request), the_desk(request)
@@ -158,9 +161,10 @@ async def screening_results(
         form = best_form(request.headers.get("accept"), (JSON, CSV, PARQUET))
         many = checked_limit(limit, MOST_ROWS, 100)
         first = checked_limit(offset, 10**8, 0, "offset", least=0)
-        table, unscreened, complete = results(desk.jobs.folders.of(job.id))
+        folder = desk.jobs.folders.of(job.id)
+        table, unscreened, complete = results(folder)
         asked = {"contact": contact, "verdict": verdict, "meets_criteria": meets_criteria}
-        table = _filtered(table, asked)
+        table = _filtered(table, asked, folder.request()["contacts"])
         if form != JSON:
             content = to_csv(table) if form == CSV else to_parquet(table, unscreened)
             suffix = "csv" if form == CSV else "parquet"
@@ -244,11 +248,28 @@ async def _picture(request: Request, job_id: str, index: str, contact: str | Non
     return Response(await service.work.run(make, request), media_type=PNG)
 
 
-def _filtered(table: pa.Table, asked: dict[str, str | None]) -> pa.Table:
-    if asked["contact"] is not None:
-        table = table.filter(pc.equal(table["contact_name"], asked["contact"]))
-    if asked["verdict"] is not None:
-        table = table.filter(pc.equal(table["verdict"], asked["verdict"]))
+def _filtered(table: pa.Table, asked: dict[str, str | None], contacts: Iterable[str] | None) -> pa.Table:
+    """The rows that fit the filters.
+
+    Parameters
+    ----------
+    contacts
+        Names of those of the job; None where it has the usual ones of each blade.
+
+    Raises
+    ------
+    InvalidInput
+        For a filter that no row of any such job could fit.
+    """
+    if (contact := asked["contact"]) is not None:
+        names = list(USUAL_CONTACTS if contacts is None else contacts)
+        if contact not in names and contact not in pc.unique(table["contact_name"]).to_pylist():
+            raise InvalidInput("contact", contact, f"give a contact of this job: {', '.join(names)}")
+        table = table.filter(pc.equal(table["contact_name"], contact))
+    if (verdict := asked["verdict"]) is not None:
+        if verdict not in VERDICTS:
+            raise InvalidInput("verdict", verdict, f"give one of {', '.join(VERDICTS)}")
+        table = table.filter(pc.equal(table["verdict"], verdict))
     if (meets := asked["meets_criteria"]) is not None:
         if meets not in ("true", "false"):
             raise InvalidInput("meets_criteria", meets, "give true or false")

@@ -20,6 +20,7 @@ from service.rest.access import ADMIN, READ, the_caller
 from service.rest.body import parsed
 from service.rest.forms.media_types import JSON
 from service.rest.job_schemas import JobReply, JobsReply, ScheduleReply, TrainedReply
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.openapi import problems, request_body
 from service.rest.routes.jobs import cancelled, job_response, jobs_page, progress_events, retried, the_jobs
 from service.rest.routes.request import TheJson, the_desk
@@ -30,7 +31,7 @@ from service.rest.training_question import (
     TrainingQuestion,
 )
 
-router = APIRouter(prefix="/v1/trainings", tags=["models"])
+router = APIRouter(prefix="/v1/trainings", tags=["models"], dependencies=[KNOWN_QUERY])
 
 
 @router.post(

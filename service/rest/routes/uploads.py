@@ -10,10 +10,12 @@ from starlette.responses import Response
 
 from service.jobs.durable_files import is_full
 from service.jobs.errors import NoRoom
+from service.jobs.screening.looking import Contents, contents
 from service.jobs.uploads import FORMS
 from service.rest.access import SUBMIT, Caller, the_caller
 from service.rest.forms.media_types import body_form
-from service.rest.job_schemas import UploadReply
+from service.rest.job_schemas import JobFault, UploadReply
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.limits import SlowBody
 from service.rest.openapi import problems
 from service.rest.routes.jobs import the_jobs
@@ -21,7 +23,7 @@ from service.rest.routes.request import the_desk
 from service.roles import Role
 from service.sizes import check_length
 
-router = APIRouter(prefix="/v1/uploads", tags=["screenings"], dependencies=[SUBMIT])
+router = APIRouter(prefix="/v1/uploads", tags=["screenings"], dependencies=[SUBMIT, KNOWN_QUERY])
 _UNNAMED = "upload"
 _FILE = {"schema": {"type": "string", "format": "binary"}}
 
@@ -39,8 +41,13 @@ def owner_of(caller: Caller) -> str | None:
     responses=problems(408, 413, 415, 422, 500, 503, 507),
 )
 async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
-    """Send blade files or profiles: one or a list as JSON, one a line (NDJSON), or *.json in a zip."""
-    desk, settings = the_jobs(request), the_desk(request).settings
+    """Send blade files or profiles: one or a list as JSON, one a line (NDJSON), or *.json in a zip.
+
+    It is read to its end before it is answered: what is no JSON, no whole zip, or has no blade in it is
+    refused, by line or member, and not kept. The first blade that cannot be used is told as `fault`.
+    """
+    desk, service = the_jobs(request), the_desk(request)
+    settings = service.settings
     form = body_form(request.headers.get("content-type"), FORMS)
     check_length("name", name, settings.max_name_length, "shorten it")
     announced = request.headers.get("content-length", "")
@@ -60,16 +67,29 @@ async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
                 break
             if part:
                 await to_thread.run_sync(writer.write, part)
-        owner = the_caller(request).key_id
-        upload = await to_thread.run_sync(writer.finish, name, form, owner)
+        upload = await to_thread.run_sync(writer.whole, name, form, the_caller(request).key_id)
+
+        def looked_at() -> Contents:
+            return contents(name, writer.documents(upload, settings.max_job_blades), settings)
+
+        # Whose file has come is not turned away for want of a place in the queue: sending it takes long.
+        seen = await service.work.run(looked_at, request, turn_away=False)
+        await to_thread.run_sync(writer.keep, upload)
     except BaseException as error:
         with anyio.CancelScope(shield=True):
             await to_thread.run_sync(writer.abandon)
         if isinstance(error, OSError) and is_full(error):
             raise NoRoom("data_folder", "full", "make room on the disk of the service") from None
         raise
+    fault = seen.fault
     return UploadReply(
-        id=upload.id, name=upload.name, form=upload.form, size_bytes=upload.size_bytes, sha256=upload.sha256
+        id=upload.id,
+        name=upload.name,
+        form=upload.form,
+        size_bytes=upload.size_bytes,
+        sha256=upload.sha256,
+        blades=seen.blades,
+        fault=None if fault is None else JobFault(field=fault.field, value=fault.value, remedy=fault.remedy),
     )
 
 

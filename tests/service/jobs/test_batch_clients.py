@@ -139,7 +139,14 @@ def test_an_order_too_long_for_the_body_goes_ahead_as_an_upload(taking):
         with pytest.raises(ServiceProblem) as refused:
             wrong = blade_to_dict(ROTOR) | {"damping_ratio": -1.0}
             client.submit_screening([ROTOR, ROTOR, wrong, ROTOR], **SMALL)
-    assert refused.value.problem["field"] == "blades[2].damping_ratio"
+        assert refused.value.problem["field"] == "blades[2].damping_ratio"
+        with pytest.raises(ServiceProblem, match=r"for blades\[3\]: name a tip node") as refused:
+            other = blade_to_dict(ROTOR) | {"tip_nodes": [f"M{i}" for i in range(9)]}
+            client.submit_screening(
+                [ROTOR, ROTOR, ROTOR, other], {"LE": ContactConfiguration.at("LE")}, **SMALL
+            )
+    assert refused.value.problem["field"] == "contacts[0].weights.LE"
+    assert refused.value.problem["remedy"].startswith("for blades[3]: ")
 
 
 def test_the_same_order_under_the_same_key_is_one_job_though_its_blades_went_ahead(taking):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import io
 import json
+import zipfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pyarrow.parquet as pq
@@ -31,8 +33,12 @@ QUESTION = {
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory) -> Iterator[ServiceProcess]:
-    data = tmp_path_factory.mktemp("data")
+def data(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="module")
+def service(data) -> Iterator[ServiceProcess]:
     with ServiceProcess(data, engine_workers=1, min_free_bytes=0, max_job_blades=50, drain_s=0) as running:
         yield running
 
@@ -120,11 +126,60 @@ def test_results_come_by_pages_filters_and_forms(http, done):
         ({"limit": "0000000019999999"}, "limit"),
         ({"offset": "100000000" + "0" * 5000}, "offset"),
         ({"meets_criteria": "maybe"}, "meets_criteria"),
+        ({"verdict": "unstable"}, "verdict"),
+        ({"verdict": ""}, "verdict"),
+        ({"contact": "le"}, "contact"),
+        ({"contact": "both"}, "contact"),
+        ({"verdct": "stable"}, "verdct"),
+        ({"limit": ["1", "2"]}, "limit"),
+        ({"": "stable"}, "query"),
     ],
 )
-def test_a_query_that_means_nothing_is_named(http, done, query, field):
-    refused = http.get(f"/v1/screenings/{done['id']}/results", params=query)
-    assert (refused.status_code, refused.json()["field"]) == (422, field)
+@pytest.mark.parametrize("form", ["application/json", "text/csv"])
+def test_a_query_that_means_nothing_is_named(http, done, query, field, form):
+    refused = http.get(f"/v1/screenings/{done['id']}/results", params=query, headers={"Accept": form})
+    assert (refused.status_code, refused.json()["field"]) == (422, field), refused.text
+
+
+def test_a_filter_that_nothing_could_fit_is_refused_with_those_that_could(http, done):
+    base = f"/v1/screenings/{done['id']}/results"
+    assert http.get(base, params={"contact": "both"}).json()["remedy"] == "give a contact of this job: LE, TE"
+    said = http.get(base, params={"verdict": "x"}).json()["remedy"]
+    assert said == "give one of stable, unstable at some speed, not decided"
+    assert (
+        http.get(base, params={"verdct": "x"}).json()["remedy"].startswith("leave it out, or give verdict:")
+    )
+    # What could fit, and nothing does, is an empty page.
+    assert http.get(base, params={"verdict": "not decided"}).json()["total"] == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/v1/screenings"),
+        ("POST", "/v1/screenings"),
+        ("GET", "/v1/screenings/{id}"),
+        ("DELETE", "/v1/screenings/{id}"),
+        ("POST", "/v1/screenings/{id}/retry"),
+        ("GET", "/v1/screenings/{id}/events"),
+        ("GET", "/v1/screenings/{id}/report"),
+        ("GET", "/v1/screenings/{id}/blades/0/map.png"),
+        ("GET", "/v1/screenings/{id}/blades/0/boundaries.png"),
+        ("GET", "/v1/trainings"),
+        ("POST", "/v1/uploads"),
+    ],
+)
+def test_a_parameter_that_a_route_of_jobs_does_not_have_is_refused(http, done, method, path):
+    asked = {"contact": "LE", "nam": "x"} if path.endswith("map.png") else {"nam": "x"}
+    refused = http.request(method, path.format(id=done["id"]), params=asked)
+    assert (refused.status_code, refused.json()["field"]) == (422, "nam"), refused.text
+    assert http.get(f"/v1/screenings/{done['id']}").json()["state"] == "done"
+
+
+def test_a_state_that_no_job_has_is_refused(http):
+    refused = http.get("/v1/screenings", params={"state": "finished"})
+    assert (refused.status_code, refused.json()["field"]) == (422, "state")
+    assert "done" in refused.json()["remedy"]
 
 
 def test_events_tell_the_way_to_the_end(http, done):
@@ -175,6 +230,81 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
     assert (again.status_code, again.json()["field"]) == (404, "blades[0].upload")
 
 
+ROTOR = json.dumps(blade_to_dict(example_blade("nasa_rotor_37"))).encode()
+LINES = "application/x-ndjson"
+
+
+def zipped(**files: bytes) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "status", "field"),
+    [
+        (LINES, ROTOR + b'\n{"schema": \n', 422, "night:2"),
+        (LINES, b"\n\n", 422, "night"),
+        (LINES, b'{"name": "a", "name": "b"}', 422, "night:1.name"),
+        (LINES, b"{}\n" * 51, 413, "night"),
+        ("application/json", b"[]", 422, "night"),
+        ("application/json", b"", 422, "night"),
+        ("application/json", b'[{}, {"states": [{"a": 1, "a": 2}]}]', 422, "night[1].states[0].a"),
+        ("application/json", b"\xff", 422, "night"),
+        ("application/zip", ROTOR, 422, "night"),
+        ("application/zip", zipped(**{"a.json": ROTOR})[:-30], 422, "night"),
+        ("application/zip", zipped(**{"a.txt": ROTOR}), 422, "night"),
+        ("application/zip", zipped(**{"a.json": ROTOR, "sub/b.json": b"{"}), 422, "night/sub/b.json"),
+        ("application/zip", zipped(**{"a.json": b" " * 10**7}), 413, "night/a.json"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused_when_it_has_come_and_not_kept(
+    http, data, form, content, status, field
+):
+    before = sorted((data / "uploads").iterdir())
+    refused = http.post("/v1/uploads?name=night", content=content, headers={"Content-Type": form})
+    assert (refused.status_code, refused.json()["field"]) == (status, field), refused.text
+    assert refused.json()["remedy"]
+    assert sorted((data / "uploads").iterdir()) == before
+
+
+DAMPED_BELOW_ZERO = ROTOR.replace(b'"damping_ratio": [', b'"damping_ratio": [-', 1)
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "blades", "fault"),
+    [
+        (LINES, b"\n".join([ROTOR, b"", ROTOR]), 2, None),
+        (LINES, b"\n".join([ROTOR, ROTOR, DAMPED_BELOW_ZERO, b"{}"]), 4, "night:3.damping_ratio[0]"),
+        ("application/json", ROTOR, 1, None),
+        ("application/json", b"[" + ROTOR + b", 5, {}]", 3, "night[1]"),
+        (
+            "application/zip",
+            zipped(**{"a.json": ROTOR, "b.json": DAMPED_BELOW_ZERO}),
+            2,
+            "night/b.json.damping_ratio[0]",
+        ),
+    ],
+)
+def test_a_file_is_answered_with_the_blades_in_it_and_the_first_that_cannot_be_used(
+    http, form, content, blades, fault
+):
+    sent = http.post("/v1/uploads?name=night", content=content, headers={"Content-Type": form})
+    assert sent.status_code == 201, sent.text
+    told = sent.json()
+    assert told["blades"] == blades
+    assert (told["fault"] and told["fault"]["field"]) == fault
+    order = changed(blades=[{"upload": told["id"]}], bad_blades="refuse")
+    ordered = http.post("/v1/screenings", json=order)
+    if fault is None:  # what is not told here is not refused there either
+        assert ordered.status_code == 202, ordered.text
+        http.delete(ordered.json()["links"]["self"])
+    else:
+        assert (ordered.status_code, ordered.json()["field"]) == (422, fault)
+
+
 @pytest.mark.parametrize(
     ("fields", "status", "field"),
     [
@@ -187,8 +317,11 @@ def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):
         (
             {"contacts": [{"weights": {"no": 1.0}}], "bad_blades": "refuse"},
             422,
-            "blades[0].contact.weights.no",
+            "contacts[0].weights.no",
         ),
+        ({"ke_max": 1e15, "bad_blades": "refuse"}, 413, "ke_max"),
+        ({"speed_range_hz": [1e-3, 300.0], "bad_blades": "refuse"}, 413, "speed_range_hz[0]"),
+        ({"speed_range_ratio": [1e-4, 300.0], "bad_blades": "refuse"}, 422, "speed_range_ratio"),
         ({"contacts": [CONTACTS[0], CONTACTS[0]]}, 422, "contacts[1].name"),
         ({"contacts": [{"weights": {"LE": -1}}]}, 422, "contacts[0].weights.LE"),
         ({"speed_range_hz": [300.0, 100.0]}, 422, "speed_range_hz"),
@@ -215,6 +348,18 @@ def test_what_cannot_be_screened_is_refused_by_name(http, fields, status, field)
     refused = http.post("/v1/screenings", json=changed(**fields))
     assert (refused.status_code, refused.json()["field"]) == (status, field), refused.text
     assert refused.json()["remedy"]
+
+
+def test_a_contact_at_a_node_that_a_blade_has_not_is_named_with_the_blade(http):
+    contacts = [{"weights": {"LE": 1.0}}, {"name": "fifth", "weights": {"LE": 1.0, "N5": 0.5}}]
+    other = blade_to_dict(example_blade("nasa_rotor_37"))
+    other["tip_nodes"] = ["LE", *(f"M{i}" for i in range(2, 9)), "TE"]
+    asked = changed(blades=[{"example": "nasa_rotor_37"}, other], contacts=contacts, bad_blades="refuse")
+    refused = http.post("/v1/screenings", json=asked)
+    assert refused.status_code == 422, refused.text
+    problem = refused.json()
+    assert (problem["field"], problem["value"]) == ("contacts[1].weights.N5", "0.5")
+    assert problem["remedy"].startswith("for blades[1]: name a tip node of the blade: LE, M2")
 
 
 def test_a_cancelled_batch_keeps_what_it_has_and_a_retry_ends_it(http, service):

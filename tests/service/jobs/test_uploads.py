@@ -26,7 +26,9 @@ def sent(
     writer = uploads.begin(len(content))
     for start in range(0, len(content), 7):
         writer.write(content[start : start + 7])
-    return writer.finish(name, form, owner)
+    upload = writer.whole(name, form, owner)
+    writer.keep(upload)
+    return upload
 
 
 def zipped(**files: bytes) -> bytes:
