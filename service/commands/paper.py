@@ -21,7 +21,7 @@ def run(
         ),
     ] = None,
 ) -> None:
-    """Draw Figs. 5, 7, 8, 9, 10 and 13 of Salvat et al. for two real blades, and say what agrees.
+    """Draw Figs. 5 to 10 and 13 of Salvat et al. for two real blades, and say what agrees.
 
     Example: rubscreen paper --out out/paper, then open out/paper/index.html
     """

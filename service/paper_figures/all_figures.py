@@ -15,6 +15,7 @@ from service.paper_figures.centrifugal_stiffening import centrifugal_stiffening
 from service.paper_figures.contact_location import contact_location
 from service.paper_figures.modal_convergence import modal_convergence
 from service.paper_figures.paper_figure import PaperFigure, newtons
+from service.paper_figures.responses import responses
 from service.paper_figures.stability_diagram import stability_diagram
 from service.paper_figures.study import Study, study_of
 from service.paper_figures.time_convergence import time_convergence, time_convergence_parts
@@ -57,7 +58,7 @@ def example_studies(direction: str | None = None) -> list[Study]:
 
 def all_figures(studies: list[Study], progress: Progress = lambda *_: None) -> Iterator[BladeFigures]:
     """Figures of one blade after the other; `progress` hears (done, total, what is next)."""
-    quick = (stability_diagram, modal_convergence, centrifugal_stiffening, contact_location)
+    quick = (stability_diagram, responses, modal_convergence, centrifugal_stiffening, contact_location)
     parts = [time_convergence_parts(study) for study in studies]
     total = sum(parts) + len(studies) * (len(quick) + 1)
     count = 0

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from service.paper_figures.lobes import Lobes, exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, PaperFigure, newtons
+from service.paper_figures.paper_figure import Claim, LobeFigure, newtons
 from service.paper_figures.study import Study, ke_axis, least_ke_of_modes, with_modes
 
 # A lobe's width is taken at this multiple of its own least K_e.
 _WIDTH_AT = 2.0
 
 
-def bending_and_torsion(study: Study) -> PaperFigure:
+def bending_and_torsion(study: Study) -> LobeFigure:
     """Each mode alone, with centrifugal effects, contact at the leading edge."""
     low, high = study.ratios
     f1, covered, contact = study.first_frequency_hz, study.covered, study.leading_edge
@@ -21,7 +21,7 @@ def bending_and_torsion(study: Study) -> PaperFigure:
     top = ke_axis([least_ke_of_modes(blade, contact) for blade in blades.values()])
     speed = speed_grid([(blade, contact) for blade in blades.values()], f1, (low, high), top, also=(covered,))
     torsion, bending = (exact_lobes(label, blade, contact, speed, f1, top) for label, blade in blades.items())
-    return PaperFigure(
+    return LobeFigure(
         number=13,
         title="First bending mode alone against first torsion mode alone, contact at the leading edge",
         blade=study.blade.name,

@@ -9,7 +9,7 @@ import numpy as np
 from sdm_core.blade import Blade
 from sdm_core.lobe_tips import least_critical_ke
 from service.paper_figures.lobes import Lobes, exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, PaperFigure, newtons, percent
+from service.paper_figures.paper_figure import Claim, LobeFigure, newtons, percent
 from service.paper_figures.study import Study, at_rest, ke_axis, least_ke_of_modes
 
 _EVERY_LOBE = 400
@@ -24,7 +24,7 @@ class _Tip:
     ke: float
 
 
-def centrifugal_stiffening(study: Study) -> PaperFigure:
+def centrifugal_stiffening(study: Study) -> LobeFigure:
     """All modes, contact at the leading edge."""
     low, high = study.ratios
     f1, contact, covered = study.first_frequency_hz, study.leading_edge, study.covered
@@ -37,7 +37,7 @@ def centrifugal_stiffening(study: Study) -> PaperFigure:
     with_effects = exact_lobes("with centrifugal effects", study.blade, contact, speed, f1, top)
     without = exact_lobes("without", still, contact, speed, f1, top)
     moved = _moved(study, still, top)
-    return PaperFigure(
+    return LobeFigure(
         number=9,
         title="With and without centrifugal effects, contact at the leading edge",
         blade=study.blade.name,

@@ -6,14 +6,14 @@ import numpy as np
 
 from sdm_core.contact import ContactConfiguration
 from service.paper_figures.lobes import Lobes, exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, PaperFigure, newtons, percent
+from service.paper_figures.paper_figure import Claim, LobeFigure, newtons, percent
 from service.paper_figures.study import Study, ke_axis, least_ke_of_modes
 
 # How much larger the paper's "significantly larger" is at least.
 SIGNIFICANT = 1.2
 
 
-def contact_location(study: Study) -> PaperFigure:
+def contact_location(study: Study) -> LobeFigure:
     """All modes, with centrifugal effects."""
     low, high = study.ratios
     f1, covered = study.first_frequency_hz, study.covered
@@ -27,7 +27,7 @@ def contact_location(study: Study) -> PaperFigure:
     }
     shares = {name: curve.share(low, covered) for name, curve in curves.items()}
     soft = {name: flexibility(study, contact) for name, contact in contacts.items()}
-    return PaperFigure(
+    return LobeFigure(
         number=10,
         title="Leading edge against trailing edge",
         blade=study.blade.name,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.paper_figures.lobes import exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, PaperFigure, newtons, percent
+from service.paper_figures.paper_figure import Claim, LobeFigure, newtons, percent
 from service.paper_figures.study import Study, at_rest, ke_axis, least_ke_of_modes, with_modes
 
 MOST_MODES = 5
@@ -11,7 +11,7 @@ MOST_MODES = 5
 SUPERIMPOSED = 0.05
 
 
-def modal_convergence(study: Study) -> PaperFigure:
+def modal_convergence(study: Study) -> LobeFigure:
     """Without centrifugal effects, contact at the leading edge."""
     low, high = study.ratios
     f1, contact = study.first_frequency_hz, study.leading_edge
@@ -39,7 +39,7 @@ def modal_convergence(study: Study) -> PaperFigure:
         else f"; least K_e {newtons(least_two[0])} with two, {newtons(least_all[0])} with {count}"
     )
     ratio = added / whole if whole else 0.0
-    return PaperFigure(
+    return LobeFigure(
         number=8,
         title="Modal convergence, contact at the leading edge, without centrifugal effects",
         blade=study.blade.name,

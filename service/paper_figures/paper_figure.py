@@ -50,9 +50,9 @@ class Mark:
     label: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PaperFigure:
-    """A figure ready to be drawn.
+    """A figure ready to be drawn: what every kind of figure has.
 
     Attributes
     ----------
@@ -62,18 +62,10 @@ class PaperFigure:
         What is drawn.
     blade
         Name of the blade.
-    curves
-        Drawn as lines, or the one of a shaded diagram filled.
     claims
         Statements of the paper held against it.
     notes
         What the reader must know about how it was drawn.
-    extrapolated_from
-        Ω/f₁ beyond which the modal data are extrapolated; None where they are not.
-    shaded
-        Fill the unstable side of the curve.
-    marks
-        Points on the diagram.
     numbers
         Further figures, as JSON.
     """
@@ -81,20 +73,9 @@ class PaperFigure:
     number: int
     title: str
     blade: str
-    first_frequency_hz: float
-    ratios: tuple[float, float]
-    curves: tuple[Lobes, ...]
     claims: tuple[Claim, ...]
     notes: tuple[str, ...] = ()
-    extrapolated_from: float | None = None
-    shaded: bool = False
-    marks: tuple[Mark, ...] = ()
     numbers: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def ke_max(self) -> float:
-        """Top of the K_e axis, N/m."""
-        return self.curves[0].ke_max
 
     @property
     def agrees(self) -> str:
@@ -113,11 +94,54 @@ class PaperFigure:
 
     def to_dict(self) -> dict[str, Any]:
         """The figure's numbers as JSON."""
-        low, high = self.ratios
         return {
             "figure": self.number,
             "title": self.title,
             "blade": self.blade,
+            **self._drawn(),
+            "claims": [claim.to_dict() for claim in self.claims],
+            "agrees": self.agrees,
+            "differs": self.differs,
+            "notes": list(self.notes),
+            **self.numbers,
+        }
+
+    def _drawn(self) -> dict[str, Any]:
+        """What is drawn, as JSON."""
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LobeFigure(PaperFigure):
+    """Boundaries over Ω/f₁ and K_e.
+
+    Attributes
+    ----------
+    curves
+        Drawn as lines, or the one of a shaded diagram filled.
+    extrapolated_from
+        Ω/f₁ beyond which the modal data are extrapolated; None where they are not.
+    shaded
+        Fill the unstable side of the curve.
+    marks
+        Points on the diagram.
+    """
+
+    first_frequency_hz: float
+    ratios: tuple[float, float]
+    curves: tuple[Lobes, ...]
+    extrapolated_from: float | None = None
+    shaded: bool = False
+    marks: tuple[Mark, ...] = ()
+
+    @property
+    def ke_max(self) -> float:
+        """Top of the K_e axis, N/m."""
+        return self.curves[0].ke_max
+
+    def _drawn(self) -> dict[str, Any]:
+        low, high = self.ratios
+        return {
             "first_frequency_hz": self.first_frequency_hz,
             "speed_ratio": [low, high],
             "extrapolated_from_ratio": self.extrapolated_from,
@@ -126,11 +150,6 @@ class PaperFigure:
             "points": [
                 {"speed_ratio": m.ratio, "ke": m.ke, "stable": m.stable, "said": m.label} for m in self.marks
             ],
-            "claims": [claim.to_dict() for claim in self.claims],
-            "agrees": self.agrees,
-            "differs": self.differs,
-            "notes": list(self.notes),
-            **self.numbers,
         }
 
 

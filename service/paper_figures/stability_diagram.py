@@ -5,13 +5,13 @@ from __future__ import annotations
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import StabilitySolution, stability
 from service.paper_figures.lobes import Lobes, exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, Mark, PaperFigure, newtons, percent
+from service.paper_figures.paper_figure import Claim, LobeFigure, Mark, newtons, percent
 from service.paper_figures.study import PAPER_KE_MAX, Study, ke_axis, least_ke_of_modes
 
 STABLE_POINT, UNSTABLE_POINT = 2e3, 2e4
 
 
-def stability_diagram(study: Study) -> PaperFigure:
+def stability_diagram(study: Study) -> LobeFigure:
     """Grey lobes of all the blade's modes, with centrifugal effects.
 
     The paper does not say at which speed its test points lie: here, in the middle of the widest stretch
@@ -38,7 +38,7 @@ def stability_diagram(study: Study) -> PaperFigure:
         f"{nowhere}; {percent(lobes.share(low, covered))} of the diagram up to {newtons(top)} is unstable",
         least is not None and least[0] < PAPER_KE_MAX,
     )
-    return PaperFigure(
+    return LobeFigure(
         number=5,
         title="Stability diagram, contact at the leading edge",
         blade=study.blade.name,

@@ -11,7 +11,7 @@ import numpy as np
 from sdm_core.blade import Blade
 from service.paper_figures.fixed_steps import fixed_step_lobes, parts_of
 from service.paper_figures.lobes import Lobes, exact_lobes, speed_grid
-from service.paper_figures.paper_figure import Claim, PaperFigure, percent
+from service.paper_figures.paper_figure import Claim, LobeFigure, percent
 from service.paper_figures.study import Study, at_rest, ke_axis, least_ke_of_modes, with_modes
 
 STEPS = (40, 60, 80)
@@ -63,7 +63,7 @@ def time_convergence_parts(study: Study) -> int:
     return len(STEPS) * parts_of(_grid(study)[0])
 
 
-def time_convergence(study: Study, done: Callable[[], None] = lambda: None) -> PaperFigure:
+def time_convergence(study: Study, done: Callable[[], None] = lambda: None) -> LobeFigure:
     """Lines of N = 40, 60, 80 and the exact one, without centrifugal effects, contact at the leading edge."""
     low, high = study.ratios
     f1, blade, contact = study.first_frequency_hz, time_convergence_blade(study), study.leading_edge
@@ -81,7 +81,7 @@ def time_convergence(study: Study, done: Callable[[], None] = lambda: None) -> P
         }
         for n, found in schemes.items()
     }
-    return PaperFigure(
+    return LobeFigure(
         number=7,
         title="Time convergence of semi-discretization, first two modes, without centrifugal effects",
         blade=study.blade.name,

@@ -21,6 +21,7 @@ from service.paper_figures.lobes import Lobes, exact_lobes
 from service.paper_figures.modal_convergence import modal_convergence
 from service.paper_figures.outline import outlines
 from service.paper_figures.paper_figure import Claim, PaperFigure
+from service.paper_figures.responses import responses
 from service.paper_figures.stability_diagram import stability_diagram
 from service.paper_figures.study import Study, at_rest, ke_axis, least_ke_of_modes, study_of, with_modes
 from service.paper_figures.time_convergence import lobe_errors
@@ -219,11 +220,32 @@ def test_the_papers_upper_test_point_is_judged_by_the_exact_core(narrow, example
 
 def test_lines_name_what_was_not_comparable_and_what_the_paper_says():
     claims = (Claim("the paper's", "what is here", False), Claim("that", "too few", None))
-    figure = PaperFigure(5, "", "", 1.0, (0.1, 0.4), (), claims)
+    figure = PaperFigure(number=5, title="", blade="", claims=claims)
     assert figure.agrees == "Nothing, of 2 statements compared."
     assert figure.differs == (
         "What is here (the paper: the paper's); too few (not comparable; the paper: that)."
     )
+
+
+def test_responses_grow_and_settle_as_their_multipliers_say():
+    figure = responses(study_of(example_blade("nasa_rotor_37")))
+    for row in figure.numbers["responses"]:
+        assert row["growth_fitted"] == pytest.approx(row["growth_of_multiplier"], abs=1e-9)
+        assert row["frequency_fitted_hz"] == pytest.approx(row["chatter_hz"], rel=1e-9)
+    for panel in figure.panels:
+        stable, unstable = panel.histories
+        assert stable.stable and not unstable.stable
+        for history in (stable, unstable):
+            # Each begins at 2 mm, at rest.
+            assert history.displacement[0] == pytest.approx(2e-3, rel=1e-9)
+            assert history.displacement[1] == pytest.approx(2e-3, rel=2e-2)
+            each = [
+                np.abs(history.displacement[history.revolution.astype(int) == k]).max() for k in range(30)
+            ]
+            assert np.log(each[-1] / each[15]) * history.growth_per_revolution > 0
+    assert all(claim.holds for claim in figure.claims)
+    faster, slower = (panel.histories[1].growth_per_revolution for panel in figure.panels)
+    assert faster > slower > 0
 
 
 def test_the_shipped_blades_begin_with_bending_and_torsion():
@@ -247,10 +269,10 @@ def test_the_command_writes_every_figure_a_page_and_the_numbers(rubscreen, narro
     assert drawn == [
         (blade, number)
         for blade in ("nasa-rotor-37", "generic-compressor-blade")
-        for number in (5, 7, 8, 9, 10, 13)
+        for number in (5, 6, 7, 8, 9, 10, 13)
     ]
     page = (out / "index.html").read_text()
-    assert page.count("data:image/png;base64,") == 12
+    assert page.count("data:image/png;base64,") == 14
     assert not re.search(r"<script|https?://|src=\"(?!data:)", page)
     for figure in document["figures"]:
         assert (out / figure["picture"]).read_bytes().startswith(b"\x89PNG")
