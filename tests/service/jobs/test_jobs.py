@@ -200,45 +200,6 @@ def test_two_processes_do_not_share_a_folder_with_sqlite(tmp_path):
         Jobs(database, tmp_path, {}, JobSettings({}))
 
 
-def test_a_schedule_is_kept_over_a_restart_and_calls_when_it_is_due(database, tmp_path):
-    due: list[tuple[str, dict]] = []
-
-    def tick(jobs: Jobs, at: str, context: dict) -> None:
-        due.append((at, context))
-
-    def opened() -> Jobs:
-        kinds = {SCREENING: Counting(), TRAINING: Counting()}
-        return Jobs(database, tmp_path, kinds, JobSettings({SCREENING: 1}), tick)
-
-    jobs = opened()
-    try:
-        for cron, timezone in (("daily", "UTC"), ("* * * * * *", "UTC"), ("0 3 * * *", "Mars/Olympus")):
-            with pytest.raises(InvalidInput):
-                jobs.queue.schedule(cron, timezone, {})
-        assert jobs.queue.scheduled() is None
-        jobs.queue.schedule("0 3 * * SUN", "Europe/Paris", {"training": {"seed": 1}})
-    finally:
-        jobs.close()
-    jobs = opened()
-    try:
-        found = jobs.queue.scheduled()
-        assert (found.cron, found.timezone, found.context) == (
-            "0 3 * * SUN",
-            "Europe/Paris",
-            {"training": {"seed": 1}},
-        )
-        assert (found.coming.isoweekday(), found.coming.hour, found.coming.minute) == (7, 3, 0)
-        from dbos import DBOS
-
-        DBOS.trigger_schedule("training")  # as the clock would
-        wait_for(lambda: len(due) == 1)
-        assert due[0][1] == {"training": {"seed": 1}}
-        jobs.queue.unschedule()
-        assert jobs.queue.scheduled() is None
-    finally:
-        jobs.close()
-
-
 @needs_postgres
 def test_nothing_in_the_queue_is_pickled(postgres_url, tmp_path):
     import psycopg
