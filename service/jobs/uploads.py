@@ -274,16 +274,26 @@ def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
                     remedy = f"give at most {_LARGEST_BLADE}"
                     raise UploadTooLarge(where, f"over {_LARGEST_BLADE} bytes", remedy)
                 yield where, _parsed(content, where)
-    except (zipfile.BadZipFile, EOFError, RuntimeError, NotImplementedError, OSError) as error:
+    except (
+        zipfile.BadZipFile,
+        EOFError,
+        RuntimeError,
+        NotImplementedError,
+        OSError,
+        UnicodeDecodeError,
+    ) as error:
         remedy = f"send a whole zip without a password ({error})"
         raise DamagedUpload(upload.name, f"{upload.size_bytes} bytes", remedy) from None
 
 
 def _parsed(content: bytes, where: str) -> Any:
     try:
-        return parse_json(content)
+        found = parse_json(content)
+        if b"\\ud" in content.lower():  # half a surrogate pair is no character: no table could hold it
+            json.dumps(found, ensure_ascii=False).encode()
     except InvalidInput as error:
         raise error.under(where) from None
     except (ValueError, RecursionError) as error:
         said = str(error) or "nested too deep"
         raise DamagedUpload(where, f"{len(content)} bytes", f"give JSON in UTF-8 ({said})") from None
+    return found

@@ -8,7 +8,15 @@ from pathlib import Path
 
 from sqlalchemy import Column, Connection, Engine, Integer, MetaData, Table, create_engine, event, text
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError, SQLAlchemyError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DBAPIError,
+    InterfaceError,
+    NoSuchModuleError,
+    OperationalError,
+    SQLAlchemyError,
+    TimeoutError,
+)
 
 from sdm_core.errors import InvalidInput
 
@@ -116,6 +124,23 @@ class Database:
             elif found > SCHEMA_VERSION:
                 remedy = f"this program knows versions up to {SCHEMA_VERSION}: install a newer one"
                 raise InvalidInput("database_url", f"{self.shown}, version {found}", remedy)
+
+
+def does_not_answer(error: SQLAlchemyError) -> bool:
+    """Whether an error says that the database is away, hangs, is busy or full, and so may pass.
+
+    Anything else is a fault of the question, which would fail again: text that it cannot hold, say.
+    """
+    if isinstance(error, OperationalError | InterfaceError | TimeoutError):
+        return True
+    return isinstance(error, DBAPIError) and error.connection_invalidated
+
+
+def is_out_of_room(error: SQLAlchemyError) -> bool:
+    """Whether the database has no room left on its disk."""
+    cause = getattr(error, "orig", None)  # not the error's own text, which quotes what was asked
+    disk_full = getattr(cause, "sqlstate", None) == "53100"  # PostgreSQL, appendix A
+    return disk_full or "disk is full" in str(cause)
 
 
 def open_database(data_folder: Path, url: str | None = None) -> Database:

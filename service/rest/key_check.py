@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from anyio import to_thread
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.records.database import does_not_answer
 from service.records.keys import LAST_USE_EVERY_S, ApiKey, KeyStore, split_key
 from service.rest.access import HOW_TO_SEND, NotAuthenticated
 from service.rest.errors import NotReady
@@ -99,6 +100,8 @@ class KeyCheck:
             try:
                 key = await to_thread.run_sync(self._store.find, key_id)
             except SQLAlchemyError as error:
+                if not does_not_answer(error):
+                    raise
                 logger.error("keys cannot be read: %s", error)
                 raise NotReady("keys", "the database does not answer", "send the request again") from None
             if key is None:
