@@ -19,8 +19,10 @@ from sqlalchemy.exc import (
 )
 
 from sdm_core.errors import InvalidInput
+from service.records import shape
 
-# Raised when a table changes in a way that rows written before do not fit; columns are only ever added.
+# Raised when a table changes in a way that rows written before do not fit. Columns are only ever added, and
+# may be NULL: where a table is older than its newest column, that is added when the database is opened.
 SCHEMA_VERSION = 1
 FILE = "rubscreen.sqlite"
 RESTORING = ".restoring"  # below a data folder while a backup is unpacked into it
@@ -59,7 +61,7 @@ def database_url(url: str | None, data_folder: Path) -> URL:
 
 
 class Database:
-    """Connections to the database, whose tables are made when it is opened.
+    """Connections to the database, whose tables are made, or made complete, when it is opened.
 
     Raises
     ------
@@ -124,6 +126,14 @@ class Database:
             elif found > SCHEMA_VERSION:
                 remedy = f"this program knows versions up to {SCHEMA_VERSION}: install a newer one"
                 raise InvalidInput("database_url", f"{self.shown}, version {found}", remedy)
+            short = shape.is_short(connection, METADATA)
+            if short and self.shared:
+                shape.complete(connection, METADATA)
+        if short and not self.shared:
+            with self.begin() as connection:
+                # Python begins a transaction of SQLite with the first change of rows, which none is here.
+                connection.exec_driver_sql("BEGIN IMMEDIATE")
+                shape.complete(connection, METADATA)
 
 
 def does_not_answer(error: SQLAlchemyError) -> bool:
