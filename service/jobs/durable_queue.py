@@ -19,6 +19,8 @@ from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.records.database import PATIENCE
+
 # Of what is in the queue, not of the code: jobs accepted by an older program run on a newer one.
 QUEUE_VERSION = "1"
 SCHEMA = "rubscreen_queue"  # of PostgreSQL
@@ -114,6 +116,10 @@ class DurableQueue:
             "scheduler_polling_interval_sec": 60.0,
             "sys_db_pool_size": 10,
         }
+        if not url.drivername.startswith("sqlite"):
+            # No statement_timeout: a newer DBOS may have large tables to change when it starts.
+            named = {"application_name": "rubscreen_queue"}
+            config["db_engine_kwargs"] = {"connect_args": PATIENCE | named}
 
         self._begun: set[str] = set()
 

@@ -28,6 +28,15 @@ FILE = "rubscreen.sqlite"
 RESTORING = ".restoring"  # below a data folder while a backup is unpacked into it
 _LOCK = 7_201_137  # any number, the same in every replica: PostgreSQL's advisory lock while tables are made
 
+# Of connections to PostgreSQL: one that hangs is given up, like one that refuses (libpq's names; s, and ms
+# for tcp_user_timeout).
+PATIENCE: dict[str, int] = {
+    "connect_timeout": 5,
+    "tcp_user_timeout": 10_000,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+}
+
 METADATA = MetaData()
 _VERSION = Table("rubscreen_schema", METADATA, Column("version", Integer, primary_key=True))
 
@@ -176,14 +185,7 @@ def open_database(data_folder: Path, url: str | None = None) -> Database:
 def _engine(url: URL) -> Engine:
     if not url.drivername.startswith("sqlite"):
         # A connection that the server closed meanwhile is found out before it is used.
-        # One that hangs is given up, like one that refuses.
-        patience = {
-            "connect_timeout": 5,
-            "tcp_user_timeout": 10_000,
-            "keepalives_idle": 10,
-            "keepalives_interval": 5,
-            "options": "-c statement_timeout=30000",
-        }
+        patience = PATIENCE | {"options": "-c statement_timeout=30000"}
         return create_engine(url, pool_pre_ping=True, pool_size=5, max_overflow=15, connect_args=patience)
     engine = create_engine(url, connect_args={"timeout": 30.0})
 

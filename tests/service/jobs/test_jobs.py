@@ -18,7 +18,7 @@ from service.jobs.errors import NoRoom, UnderWay
 from service.jobs.job import SCREENING, TRAINING, Job, State
 from service.jobs.job_folder import JobFolder
 from service.jobs.jobs import Jobs, JobSettings
-from service.records.database import Database, database_url
+from service.records.database import PATIENCE, Database, database_url
 
 
 class Counting:
@@ -220,3 +220,17 @@ def test_nothing_in_the_queue_is_pickled(postgres_url, tmp_path):
     database.close()
     assert any('"args": ["' + accepted.id in row for row in rows)
     assert not any("gASV" in row for row in rows)  # how a pickle begins, in base64
+
+
+@needs_postgres
+def test_connections_of_the_queue_give_up_a_server_that_hangs_as_ours_do(postgres_url, tmp_path):
+    from dbos._dbos import _get_dbos_instance
+
+    database = Database(database_url(postgres_url, tmp_path))
+    with jobs_of(database, tmp_path, Counting()):
+        for engine in (database.engine, _get_dbos_instance()._sys_db.engine):
+            with engine.connect() as connection:
+                told = connection.connection.driver_connection.info.get_parameters()
+                assert {name: int(told[name]) for name in PATIENCE} == PATIENCE
+                assert PATIENCE["connect_timeout"] < 10 and PATIENCE["tcp_user_timeout"] <= 10_000
+    database.close()
