@@ -31,6 +31,7 @@ from service.jobs.errors import (
     NotScreened,
     NotTrained,
     OtherRequest,
+    TooManyUploads,
     UnderWay,
     UploadTooLarge,
 )
@@ -114,6 +115,7 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (UnderWay, Kind("under-way", "The job is not over", 409)),
     (UploadTooLarge, Kind("too-large", "The request is too large", 413)),
     (NoRoom, Kind("no-room", "The service has no room left on its disk", 507)),
+    (TooManyUploads, Kind("upload-quota", "The caller's files take up as much as they may", 507)),
     (TooLarge, Kind("too-large", "The request is too large", 413)),
     (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
     (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),

@@ -60,7 +60,12 @@ class JobDesk:
         keep = Keep(settings.keep_jobs_days, settings.keep_uploads_days)
         how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes, keep)
         jobs = Jobs(database, data_folder, kinds, how, train_when_due)
-        uploads = Uploads(jobs.folders.uploads, settings.max_upload_bytes, settings.min_free_bytes)
+        uploads = Uploads(
+            jobs.folders.uploads,
+            settings.max_upload_bytes,
+            settings.min_free_bytes,
+            settings.max_uploads_bytes,
+        )
         return cls(jobs, uploads, engine, Rankings())
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from sqlalchemy.exc import DataError, InterfaceError, OperationalError, Programm
 
 from service.app import create_app
 from service.jobs.errors import DamagedUpload
-from service.jobs.uploads import JSON, LINES, ZIP, Uploads
+from service.jobs.uploads import JSON, LINES, ZIP, Upload, Uploads, UploadWriter
 from service.records.database import does_not_answer, is_out_of_room
 from service.settings import Settings
 
@@ -102,12 +102,18 @@ def test_no_such_text_is_a_schedule_or_an_idempotency_key(http, text):
 @pytest.mark.parametrize("text", TEXTS, ids=NAMED)
 def test_a_file_may_have_any_name_and_is_no_path(http, text):
     where = f"/v1/uploads?name={in_url(text)}"
-    reply = http.post(where, content=b"[]", headers={"Content-Type": "application/json"})
+    reply = http.post(where, content=b"[{}]", headers={"Content-Type": "application/json"})
     if len(text) > 5000:
         refused(reply)
     else:
         assert reply.status_code == 201, reply.text
         assert http.delete(f"/v1/uploads/{reply.json()['id']}").status_code == 204
+
+
+def _kept(writer: UploadWriter, name: str, form: str) -> Upload:
+    upload = writer.whole(name, form)
+    writer.keep(upload)
+    return upload
 
 
 def test_half_a_surrogate_pair_in_a_file_is_found_when_the_job_is_accepted(tmp_path):
@@ -126,12 +132,10 @@ def test_half_a_surrogate_pair_in_a_file_is_found_when_the_job_is_accepted(tmp_p
         writer = uploads.begin()
         writer.write(content)
         with pytest.raises(DamagedUpload, match="surrogates not allowed"):
-            list(uploads.documents(writer.finish("batch", form, None), 10))
+            list(uploads.documents(_kept(writer, "batch", form), 10))
     writer = uploads.begin()
     writer.write(whole)
-    assert list(uploads.documents(writer.finish("batch", JSON, None), 10)) == [
-        ("batch", {"name": "\U0001f600"})
-    ]
+    assert list(uploads.documents(_kept(writer, "batch", JSON), 10)) == [("batch", {"name": "\U0001f600"})]
 
 
 def test_a_zip_whose_names_are_no_text_is_named(tmp_path):
@@ -142,7 +146,7 @@ def test_a_zip_whose_names_are_no_text_is_named(tmp_path):
     writer = uploads.begin()
     writer.write(content.getvalue().replace("é".encode(), b"\xff\xfe"))
     with pytest.raises(DamagedUpload, match="send a whole zip"):
-        list(uploads.documents(writer.finish("batch", ZIP, None), 10))
+        list(uploads.documents(_kept(writer, "batch", ZIP), 10))
 
 
 @pytest.mark.parametrize(
