@@ -65,6 +65,8 @@ class Settings(BaseSettings):
         Room left free on the data folder's disk: jobs wait, and new ones are refused, before it is used up.
     max_upload_bytes
         Size of one file of blades.
+    max_uploads_bytes
+        Size of all files of blades of one key together; 0, and who needs no key, is as many as the disk holds.
     max_job_blades
         Blades of one screening.
     max_job_contacts
@@ -145,6 +147,7 @@ class Settings(BaseSettings):
     scheduler_tls_key: Path | None = None
     min_free_bytes: Annotated[int, Ge(0)] = 256 * 2**20
     max_upload_bytes: Count = 512 * 2**20
+    max_uploads_bytes: Annotated[int, Ge(0)] = 4 * 2**30
     max_job_blades: Count = 20_000
     max_job_contacts: Count = 20
     max_job_results: Count = 100_000

@@ -11,25 +11,25 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any
-from zoneinfo import ZoneInfo
 
-from croniter import CroniterError, croniter
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import SQLAlchemyError
 
-from sdm_core.errors import InvalidInput
+from service.records.database import PATIENCE
 
 # Of what is in the queue, not of the code: jobs accepted by an older program run on a newer one.
 QUEUE_VERSION = "1"
 SCHEMA = "rubscreen_queue"  # of PostgreSQL
-_WORKFLOW, _DUE, _SCHEDULE = "job", "due", "training"
+_WORKFLOW = "job"
+# Older versions left the calendar to DBOS: the workflow it began, and the schedule's name.
+_DUE, _SCHEDULE = "due", "training"
 # A job killed more often than this by its process's end is given up by DBOS.
 _MOST_RECOVERIES = 10_000
-_PAGE, _CALLS_KEPT = 500, 20
+_PAGE = 500
 _OVER = ("SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED")
 logging.getLogger("dbos").setLevel(logging.WARNING)
 logger = logging.getLogger("rubscreen.jobs")
@@ -43,23 +43,19 @@ class HandedBack(BaseException):
 
 
 @dataclass(frozen=True)
-class Schedule:
-    """When something is done again.
+class FormerSchedule:
+    """A schedule that an older version made.
 
     Attributes
     ----------
-    cron, timezone
-        Five fields, and the time zone they are in.
-    coming
-        The next time.
-    context
-        What it is done with.
+    done_to
+        The last time it was begun at; None where it never was.
     """
 
     cron: str
     timezone: str
-    coming: datetime
     context: dict[str, Any]
+    done_to: datetime | None
 
 
 class _Json(Serializer):
@@ -93,8 +89,6 @@ class DurableQueue:
         Runs the job of an identifier; raises nothing but `HandedBack`.
     at_once
         By kind, how many jobs this process runs at once; empty runs none.
-    tick
-        Called with the time (ISO 8601) and the context of a schedule when it is due, by one process.
     poll_s
         How often the queue is looked at.
     """
@@ -107,7 +101,6 @@ class DurableQueue:
         at_once: Mapping[str, int],
         *,
         kinds: tuple[str, ...],
-        tick: Callable[[str, dict[str, Any]], None],
         poll_s: float = 0.5,
     ) -> None:
         config: DBOSConfig = {
@@ -120,9 +113,13 @@ class DurableQueue:
             "log_level": "WARNING",
             "enable_otlp": False,
             "use_listen_notify": False,
-            "scheduler_polling_interval_sec": 5.0,
+            "scheduler_polling_interval_sec": 60.0,
             "sys_db_pool_size": 10,
         }
+        if not url.drivername.startswith("sqlite"):
+            # No statement_timeout: a newer DBOS may have large tables to change when it starts.
+            named = {"application_name": "rubscreen_queue"}
+            config["db_engine_kwargs"] = {"connect_args": PATIENCE | named}
 
         self._begun: set[str] = set()
 
@@ -134,12 +131,12 @@ class DurableQueue:
                 self._begun.discard(mine)
                 raise
 
-        def due(at: Any, context: dict[str, Any]) -> None:
-            tick(str(at), context)
+        def due(at: Any, context: Any) -> None:
+            """What an older version began by the calendar just ends: the calendar begins it itself."""
 
         DBOS(config=config)
         try:
-            self._due = DBOS.workflow(name=_DUE)(due)
+            DBOS.workflow(name=_DUE)(due)
             registered = DBOS.workflow(name=_WORKFLOW, max_recovery_attempts=_MOST_RECOVERIES)(job)
             DBOS.listen_queues([kind for kind in kinds if kind in at_once])
             DBOS.launch()
@@ -174,7 +171,7 @@ class DurableQueue:
                 DBOS.delete_workflow(_run_id(job_id, attempt))
 
     def forget_orphans(self, known: Callable[[list[str]], set[str]]) -> int:
-        """Remove runs that are over and whose job is gone, and all but the last calls of a schedule.
+        """Remove runs that are over and whose job is gone, and what older versions began by the calendar.
 
         Parameters
         ----------
@@ -191,47 +188,26 @@ class DurableQueue:
         for i in range(0, len(runs), _PAGE):
             there |= known(sorted({_job_id(run) for run in runs[i : i + _PAGE]}))
         orphans = [run for run in runs if _job_id(run) not in there]
-        # That of a time that is gone is never looked at again: the schedule itself says how far it is.
-        orphans += _listed(_DUE)[:-_CALLS_KEPT]
+        orphans += _listed(_DUE)
         for i in range(0, len(orphans), _PAGE):
             DBOS.delete_workflows(orphans[i : i + _PAGE])
         return len(orphans)
 
-    def schedule(self, cron: str, timezone: str, context: dict[str, Any]) -> None:
-        """Be called again and again, for times missed while no process ran too; replaces the one before.
-
-        Raises
-        ------
-        InvalidInput
-            When `cron` has not five fields that mean something, or there is no such time zone.
-        """
-        if len(cron.split()) != 5 or not croniter.is_valid(cron) or not _comes(cron):
-            raise InvalidInput("cron", cron, 'give five fields, e.g. "0 3 * * SUN" for Sundays at three')
-        try:
-            ZoneInfo(timezone)
-        except (ValueError, OSError, LookupError):
-            raise InvalidInput("timezone", timezone, 'give an IANA name, e.g. "Europe/Paris"') from None
-        self.unschedule()
-        DBOS.create_schedule(
-            schedule_name=_SCHEDULE,
-            workflow_fn=self._due,
-            schedule=cron,
-            context=context,
-            automatic_backfill=True,
-            cron_timezone=timezone,
-        )
-
-    def scheduled(self) -> Schedule | None:
-        """The schedule there is."""
+    def former_schedule(self) -> FormerSchedule | None:
+        """The schedule that an older version left; None where it left none."""
         found = DBOS.get_schedule(_SCHEDULE)
         if found is None:
             return None
-        cron, timezone = found["schedule"], found["cron_timezone"] or "UTC"
-        coming = croniter(cron, datetime.now(ZoneInfo(timezone))).get_next(datetime)
-        return Schedule(cron, timezone, coming, found["context"])
+        last = found["last_fired_at"]
+        return FormerSchedule(
+            found["schedule"],
+            found["cron_timezone"] or "UTC",
+            found["context"],
+            None if last is None else datetime.fromisoformat(last),
+        )
 
-    def unschedule(self) -> None:
-        """Have no schedule any more."""
+    def forget_former_schedule(self) -> None:
+        """It is kept elsewhere now."""
         DBOS.delete_schedule(_SCHEDULE)
 
     def close(self, hand_back: bool = True, patience_s: float = 5.0) -> None:
@@ -259,15 +235,6 @@ class DurableQueue:
             if status is None or status.status in _OVER:
                 self._begun.discard(begun)
         return self._begun
-
-
-def _comes(cron: str) -> bool:
-    """Whether there is such a time: the 30th of February is none."""
-    try:
-        croniter(cron, datetime.now(UTC)).get_next(datetime)
-    except (CroniterError, ValueError):
-        return False
-    return True
 
 
 def _plain(value: Any) -> str:

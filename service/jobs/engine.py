@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from sdm_core.errors import InvalidInput, RubscreenError
+from sdm_core.errors import Cancelled, InvalidInput, RubscreenError
 
 Work = Callable[[bytes], bytes]
 logger = logging.getLogger("rubscreen.jobs")
@@ -129,7 +129,8 @@ class DaskEngine:
             return future.result(timeout=0)
         except KilledWorker as error:
             raise WorkerKilled(str(error)) from None
-        except (CancelledError, CommClosedError) as error:
+        except (CancelledError, CommClosedError, Cancelled) as error:
+            # Stopped on the worker's side, and not by who asks here: it has to be asked again.
             raise self._gone(error) from None
 
     def close(self) -> None:

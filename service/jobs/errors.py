@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sdm_core.errors import InvalidInput
 
 
@@ -31,6 +33,20 @@ class NoSuchUpload(InvalidInput):
 
 class UploadTooLarge(InvalidInput):
     """The file is larger than the service takes."""
+
+
+class TooManyUploads(InvalidInput):
+    """The files of the caller take up as much as they may.
+
+    Attributes
+    ----------
+    members
+        Of the problem document: the largest of them (`uploads`: id, name and size_bytes).
+    """
+
+    def __init__(self, field: str, value: Any, remedy: str, uploads: list[dict[str, Any]]) -> None:
+        super().__init__(field, value, remedy)
+        self.members = {"uploads": uploads}
 
 
 class DamagedUpload(InvalidInput):

@@ -17,6 +17,7 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from sdm_core.errors import Cancelled, InvalidInput
+from service.jobs.calendar import Calendar
 from service.jobs.control import Control
 from service.jobs.durable_files import check_room, is_full
 from service.jobs.durable_queue import DurableQueue, HandedBack
@@ -77,7 +78,12 @@ class Jobs:
     kinds
         What each kind of job does.
     tick
-        Called with this object when a schedule is due, as of `DurableQueue`.
+        Called with this object when a schedule is due, as of `Calendar`.
+
+    Attributes
+    ----------
+    calendar
+        What is done again and again.
 
     Raises
     ------
@@ -110,8 +116,9 @@ class Jobs:
                 self._run,
                 settings.at_once,
                 kinds=KINDS,
-                tick=partial(tick, self),
             )
+            self.calendar = Calendar(database, partial(tick, self))
+            self._adopt_schedule()
         except BaseException:
             self._release()
             raise
@@ -296,9 +303,20 @@ class Jobs:
                     self._replicas.forget(silent)
             except Exception as error:  # whatever it is, the next turn may do better
                 logger.warning("jobs are not tended: %s", error)
+            try:
+                self.calendar.look()
+            except Exception as error:  # tried again at the next turn
+                logger.warning("what is due by the calendar is not handed in yet: %s", error)
             turn += 1
             if self._closing.wait(every):
                 return
+
+    def _adopt_schedule(self) -> None:
+        """Keep the schedule that an older version left to the queue; what ends in between begins again."""
+        former = self.queue.former_schedule()
+        if former is not None:
+            self.calendar.schedule(former.cron, former.timezone, former.context, former.done_to)
+            self.queue.forget_former_schedule()
 
     def _queue_forgotten(self) -> None:
         """Queue jobs that were accepted, but whose process ended before they were in the queue."""

@@ -19,10 +19,11 @@ from sdm_core.interruption import checkpoint
 from sdm_core.json_members import parse_json
 from service.jobs.durable_files import INCOMING, check_room, remove_folder, sync_folder, write_durably
 from service.jobs.errors import DamagedUpload, NoSuchUpload, UploadTooLarge
+from service.jobs.upload_quota import UploadQuota
 
 JSON, LINES, ZIP = "application/json", "application/x-ndjson", "application/zip"
 FORMS = (JSON, LINES, ZIP)
-_CONTENT, _ABOUT = "content", "about.json"
+_CONTENT, ABOUT = "content", "about.json"
 _ID = re.compile(r"[0-9a-f]{32}")
 # A blade file of the largest size the service takes is a tenth of this.
 _LARGEST_BLADE = 32 * 2**20
@@ -57,25 +58,30 @@ class Upload:
 
 
 class UploadWriter:
-    """A file that is arriving."""
+    """A file that is arriving, from `owner`."""
 
-    def __init__(self, folder: Path, most_bytes: int, reserve_bytes: int = 0) -> None:
+    def __init__(
+        self, folder: Path, most_bytes: int, reserve_bytes: int, quota: UploadQuota, owner: str | None
+    ) -> None:
         self._folder, self._most, self._reserve = folder, most_bytes, reserve_bytes
+        self._quota, self._owner = quota, owner
         self._beside = folder / f"{INCOMING}{uuid.uuid4().hex}"
         self._beside.mkdir(parents=True)
         self._file = (self._beside / _CONTENT).open("xb")
-        self._digest, self._size = hashlib.sha256(), 0
+        self._digest, self._size, self._counted = hashlib.sha256(), 0, 0
 
     def write(self, part: bytes) -> None:
         """Take a part of it.
 
         Raises
         ------
-        UploadTooLarge
+        UploadTooLarge, TooManyUploads
         OSError
             A full disk, say.
         """
         self._size += len(part)
+        self._counted += len(part)
+        self._quota.arrive(self._owner, len(part))
         if self._size > self._most:
             found = f"over {self._most} bytes"
             raise UploadTooLarge("body", found, f"send at most {self._most} bytes: split the file")
@@ -85,7 +91,7 @@ class UploadWriter:
         self._digest.update(part)
         self._file.write(part)
 
-    def whole(self, name: str, form: str, owner: str | None) -> Upload:
+    def whole(self, name: str, form: str) -> Upload:
         """All of it has come and is on the disk; it is nobody's upload before it is kept.
 
         Raises
@@ -95,7 +101,7 @@ class UploadWriter:
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
-        digest = self._digest.hexdigest()
+        digest, owner = self._digest.hexdigest(), self._owner
         told = json.dumps([name, form, self._size, digest, owner])
         return Upload(hashlib.sha256(told.encode()).hexdigest()[:32], name, form, self._size, digest, owner)
 
@@ -108,17 +114,23 @@ class UploadWriter:
 
         Raises
         ------
+        TooManyUploads
+            It is to be abandoned then, as with any other error.
         OSError
         """
-        write_durably(self._beside / _ABOUT, json.dumps(asdict(upload)).encode())
-        place = self._folder / upload.id
+        write_durably(self._beside / ABOUT, json.dumps(asdict(upload)).encode())
+        with self._quota.room_for(upload.id, self._owner, self._size):
+            self._put(self._folder / upload.id)
+        self._arrived()
+
+    def _put(self, place: Path) -> None:
         try:
-            os.utime(place / _ABOUT)  # sent before, and kept as if sent now (`old_uploads`)
+            os.utime(place / ABOUT)  # sent before, and kept as if sent now (`old_uploads`)
         except FileNotFoundError:
             try:
                 os.replace(self._beside, place)
             except OSError:
-                if not (place / _ABOUT).is_file():  # nor is the same file just arriving a second time
+                if not (place / ABOUT).is_file():  # nor is the same file just arriving a second time
                     raise
                 remove_folder(self._beside)
         else:
@@ -129,6 +141,12 @@ class UploadWriter:
         """Remove what has come."""
         self._file.close()
         remove_folder(self._beside)
+        self._arrived()
+
+    def _arrived(self) -> None:
+        """It is kept, or gone: in neither case does it arrive."""
+        self._quota.arrive(self._owner, -self._counted)
+        self._counted = 0
 
 
 class Uploads:
@@ -140,13 +158,18 @@ class Uploads:
         Of one file.
     reserve_bytes
         Room to leave on the disk.
+    most_bytes_of_owner
+        Of all files of one owner together; 0 is as many as the disk holds.
     """
 
-    def __init__(self, folder: Path, most_bytes: int, reserve_bytes: int) -> None:
+    def __init__(
+        self, folder: Path, most_bytes: int, reserve_bytes: int, most_bytes_of_owner: int = 0
+    ) -> None:
         self._folder, self._most, self._reserve = folder, most_bytes, reserve_bytes
+        self._quota = UploadQuota(folder, most_bytes_of_owner, ABOUT)
 
-    def begin(self, announced_bytes: int = 0) -> UploadWriter:
-        """Make ready for a file.
+    def begin(self, announced_bytes: int = 0, owner: str | None = None) -> UploadWriter:
+        """Make ready for a file of that owner.
 
         Raises
         ------
@@ -156,7 +179,7 @@ class Uploads:
             remedy = f"send at most {self._most} bytes: split the file"
             raise UploadTooLarge("body", f"{announced_bytes} bytes", remedy)
         check_room(self._folder, announced_bytes, self._reserve)
-        return UploadWriter(self._folder, self._most, self._reserve)
+        return UploadWriter(self._folder, self._most, self._reserve, self._quota, owner)
 
     def get(self, upload_id: str, owner: str | None) -> Upload:
         """A file of this owner; None may see every one's.
@@ -167,7 +190,7 @@ class Uploads:
         """
         if isinstance(upload_id, str) and _ID.fullmatch(upload_id):  # and so no path
             try:
-                upload = Upload(**json.loads((self._folder / upload_id / _ABOUT).read_bytes()))
+                upload = Upload(**json.loads((self._folder / upload_id / ABOUT).read_bytes()))
             except (OSError, ValueError, TypeError):
                 upload = None
             if upload is not None and owner in (None, upload.owner):
@@ -215,7 +238,7 @@ def remove_uploads(folders: Iterable[Path], before: datetime) -> None:
 def _came_before(upload: Path, before: datetime) -> bool:
     try:
         # The file's time, not its folder's: that is a new one when it comes from a backup.
-        return (upload / _ABOUT).stat().st_mtime < before.timestamp()
+        return (upload / ABOUT).stat().st_mtime < before.timestamp()
     except FileNotFoundError:  # its sender deletes it just now
         return False
 
@@ -274,16 +297,26 @@ def _of_zip(path: Path, upload: Upload) -> Iterator[tuple[str, Any]]:
                     remedy = f"give at most {_LARGEST_BLADE}"
                     raise UploadTooLarge(where, f"over {_LARGEST_BLADE} bytes", remedy)
                 yield where, _parsed(content, where)
-    except (zipfile.BadZipFile, EOFError, RuntimeError, NotImplementedError, OSError) as error:
+    except (
+        zipfile.BadZipFile,
+        EOFError,
+        RuntimeError,
+        NotImplementedError,
+        OSError,
+        UnicodeDecodeError,
+    ) as error:
         remedy = f"send a whole zip without a password ({error})"
         raise DamagedUpload(upload.name, f"{upload.size_bytes} bytes", remedy) from None
 
 
 def _parsed(content: bytes, where: str) -> Any:
     try:
-        return parse_json(content)
+        found = parse_json(content)
+        if b"\\ud" in content.lower():  # half a surrogate pair is no character: no table could hold it
+            json.dumps(found, ensure_ascii=False).encode()
     except InvalidInput as error:
         raise error.under(where) from None
     except (ValueError, RecursionError) as error:
         said = str(error) or "nested too deep"
         raise DamagedUpload(where, f"{len(content)} bytes", f"give JSON in UTF-8 ({said})") from None
+    return found

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import anyio
-from anyio import to_thread
+from anyio import CapacityLimiter, to_thread
 
 from service.records.database import Database
 
 # A probe comes every few seconds from each balancer; answers as old as this are as good.
 KEEP_S = 1.0
-DATABASE_PATIENCE_S = 2.0
+PATIENCE_S = 2.0
 LEAST_FREE_BYTES = 2**20  # a few transactions of SQLite, and a line in each log
 
 
@@ -62,30 +62,53 @@ class KeptCheck:
             return self._kept[1]
 
 
-class DatabaseCheck:
-    """Whether the database can be written to, without waiting long for one that is away."""
+class PatientCheck:
+    """A check that may hang: made in a thread that nothing else waits for, and given up after a while.
 
-    def __init__(self, database: Database, patience_s: float = DATABASE_PATIENCE_S) -> None:
-        self._database, self._patience_s = database, patience_s
+    Parameters
+    ----------
+    ask
+        Makes the check.
+    late
+        The outcome when it does not come in time; while one is still being made, the next is not begun.
+    """
+
+    def __init__(self, ask: Callable[[], Check], late: Check, patience_s: float = PATIENCE_S) -> None:
+        self._ask, self._late, self._patience_s = ask, late, patience_s
         self._asking = threading.Lock()
+        # Of its own: the threads that uploads are written in may all be taken.
+        self._limiter = CapacityLimiter(1)
 
     async def __call__(self) -> Check:
         """Ask; a question that is still open from before counts as no answer, and none is added to it."""
-        answers = False
         if not self._asking.locked():
             with anyio.move_on_after(self._patience_s):
-                answers = await to_thread.run_sync(self._answers, abandon_on_cancel=True)
-        shown = self._database.shown
-        if answers:
-            return Check(True, f"{shown} can be read and written")
-        return Check(False, f"{shown} does not answer", remedy="start it, or see to the network between")
+                return await to_thread.run_sync(self._alone, abandon_on_cancel=True, limiter=self._limiter)
+        return self._late
 
-    def _answers(self) -> bool:
+    def _alone(self) -> Check:
         with self._asking:
-            try:
-                return self._database.answers()
-            except Exception:  # whatever it is, it does not answer
-                return False
+            return self._ask()
+
+
+def database_check(database: Database, patience_s: float = PATIENCE_S) -> PatientCheck:
+    """Whether the database can be written to, without waiting long for one that is away."""
+    away = Check(False, f"{database.shown} does not answer", remedy="start it, or see to the network between")
+
+    def ask() -> Check:
+        try:
+            answers = database.answers()
+        except Exception:  # whatever it is, it does not answer
+            return away
+        return Check(True, f"{database.shown} can be read and written") if answers else away
+
+    return PatientCheck(ask, away, patience_s)
+
+
+def folder_check(folder: Path, reserve_bytes: int, patience_s: float = PATIENCE_S) -> PatientCheck:
+    """As `disk_check`, without waiting long for a file system over a network that is away."""
+    away = Check(False, f"{folder} does not answer", remedy="see to the file system it is on")
+    return PatientCheck(lambda: disk_check(folder, reserve_bytes), away, patience_s)
 
 
 def disk_check(folder: Path, reserve_bytes: int) -> Check:

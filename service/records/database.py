@@ -8,15 +8,34 @@ from pathlib import Path
 
 from sqlalchemy import Column, Connection, Engine, Integer, MetaData, Table, create_engine, event, text
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError, SQLAlchemyError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DBAPIError,
+    InterfaceError,
+    NoSuchModuleError,
+    OperationalError,
+    SQLAlchemyError,
+    TimeoutError,
+)
 
 from sdm_core.errors import InvalidInput
+from service.records import shape
 
-# Raised when a table changes in a way that rows written before do not fit; columns are only ever added.
+# Raised when a table changes in a way that rows written before do not fit. Columns are only ever added, and
+# may be NULL: where a table is older than its newest column, that is added when the database is opened.
 SCHEMA_VERSION = 1
 FILE = "rubscreen.sqlite"
 RESTORING = ".restoring"  # below a data folder while a backup is unpacked into it
 _LOCK = 7_201_137  # any number, the same in every replica: PostgreSQL's advisory lock while tables are made
+
+# Of connections to PostgreSQL: one that hangs is given up, like one that refuses (libpq's names; s, and ms
+# for tcp_user_timeout).
+PATIENCE: dict[str, int] = {
+    "connect_timeout": 5,
+    "tcp_user_timeout": 10_000,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+}
 
 METADATA = MetaData()
 _VERSION = Table("rubscreen_schema", METADATA, Column("version", Integer, primary_key=True))
@@ -51,7 +70,7 @@ def database_url(url: str | None, data_folder: Path) -> URL:
 
 
 class Database:
-    """Connections to the database, whose tables are made when it is opened.
+    """Connections to the database, whose tables are made, or made complete, when it is opened.
 
     Raises
     ------
@@ -116,6 +135,31 @@ class Database:
             elif found > SCHEMA_VERSION:
                 remedy = f"this program knows versions up to {SCHEMA_VERSION}: install a newer one"
                 raise InvalidInput("database_url", f"{self.shown}, version {found}", remedy)
+            short = shape.is_short(connection, METADATA)
+            if short and self.shared:
+                shape.complete(connection, METADATA)
+        if short and not self.shared:
+            with self.begin() as connection:
+                # Python begins a transaction of SQLite with the first change of rows, which none is here.
+                connection.exec_driver_sql("BEGIN IMMEDIATE")
+                shape.complete(connection, METADATA)
+
+
+def does_not_answer(error: SQLAlchemyError) -> bool:
+    """Whether an error says that the database is away, hangs, is busy or full, and so may pass.
+
+    Anything else is a fault of the question, which would fail again: text that it cannot hold, say.
+    """
+    if isinstance(error, OperationalError | InterfaceError | TimeoutError):
+        return True
+    return isinstance(error, DBAPIError) and error.connection_invalidated
+
+
+def is_out_of_room(error: SQLAlchemyError) -> bool:
+    """Whether the database has no room left on its disk."""
+    cause = getattr(error, "orig", None)  # not the error's own text, which quotes what was asked
+    disk_full = getattr(cause, "sqlstate", None) == "53100"  # PostgreSQL, appendix A
+    return disk_full or "disk is full" in str(cause)
 
 
 def open_database(data_folder: Path, url: str | None = None) -> Database:
@@ -141,14 +185,7 @@ def open_database(data_folder: Path, url: str | None = None) -> Database:
 def _engine(url: URL) -> Engine:
     if not url.drivername.startswith("sqlite"):
         # A connection that the server closed meanwhile is found out before it is used.
-        # One that hangs is given up, like one that refuses.
-        patience = {
-            "connect_timeout": 5,
-            "tcp_user_timeout": 10_000,
-            "keepalives_idle": 10,
-            "keepalives_interval": 5,
-            "options": "-c statement_timeout=30000",
-        }
+        patience = PATIENCE | {"options": "-c statement_timeout=30000"}
         return create_engine(url, pool_pre_ping=True, pool_size=5, max_overflow=15, connect_args=patience)
     engine = create_engine(url, connect_args={"timeout": 30.0})
 

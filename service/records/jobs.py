@@ -28,12 +28,13 @@ from service.jobs.errors import NoSuchJob, OtherRequest, UnderWay
 from service.jobs.job import ACTIVE, FINISHED, Fault, Job, State
 from service.records.database import METADATA, Database
 
+LONGEST_NAME = 200
 JOBS = Table(
     "rubscreen_jobs",
     METADATA,
     Column("id", String(32), primary_key=True),
     Column("kind", String(20), nullable=False),
-    Column("name", String(200)),
+    Column("name", String(LONGEST_NAME)),
     Column("owner", String(40)),
     Column("owner_name", String(200)),
     Column("priority", Integer, nullable=False),

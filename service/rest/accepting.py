@@ -155,10 +155,7 @@ def accept_training(request: TrainingRequest, job: Job, jobs: Jobs) -> tuple[Job
 
 
 def train_when_due(jobs: Jobs, at: str, context: dict[str, Any]) -> None:
-    """Hand in the training of a schedule, unless the last one is not over."""
-    if jobs.records.page(TRAINING, states=ACTIVE, limit=1):
-        logger.warning("the training due at %s is left out: one is under way", at)
-        return
+    """Hand in the training of a schedule, unless the last one is not over; for one time once."""
     job = Job(
         uuid.uuid4().hex,
         TRAINING,
@@ -167,6 +164,11 @@ def train_when_due(jobs: Jobs, at: str, context: dict[str, Any]) -> None:
         owner_name=context["owner_name"],
         idempotency_key=f"schedule {at}",
     )
+    if jobs.records.of_request(job) is not None:  # by another replica, or before this one was ended
+        return
+    if jobs.records.page(TRAINING, states=ACTIVE, limit=1):
+        logger.warning("the training due at %s is left out: one is under way", at)
+        return
     asked = context["training"]
     accept_training(TrainingRequest.from_dict({**asked, "seed": asked["seed"] or seed_of(job)}), job, jobs)
 

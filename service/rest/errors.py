@@ -31,9 +31,11 @@ from service.jobs.errors import (
     NotScreened,
     NotTrained,
     OtherRequest,
+    TooManyUploads,
     UnderWay,
     UploadTooLarge,
 )
+from service.records.database import does_not_answer, is_out_of_room
 from service.rest.access import NotAllowed, NotAuthenticated
 from service.rest.job_quota import TooManyJobs
 from service.rest.limits import Busy, SlowBody
@@ -113,6 +115,7 @@ KINDS: tuple[tuple[type[InvalidInput], Kind], ...] = (
     (UnderWay, Kind("under-way", "The job is not over", 409)),
     (UploadTooLarge, Kind("too-large", "The request is too large", 413)),
     (NoRoom, Kind("no-room", "The service has no room left on its disk", 507)),
+    (TooManyUploads, Kind("upload-quota", "The caller's files take up as much as they may", 507)),
     (TooLarge, Kind("too-large", "The request is too large", 413)),
     (TooMuchWork, Kind("too-much-work", "More exact work than one call may ask for", 413)),
     (SlowBody, Kind("slow-body", "The body did not arrive in time", 408)),
@@ -235,9 +238,12 @@ def _answer_stopped(request: Request, error: Exception) -> Response:
 
 
 def _answer_database(request: Request, error: Exception) -> Response:
-    full = "full" in str(error)
+    assert isinstance(error, SQLAlchemyError)
+    if not does_not_answer(error):
+        logger.error("the database refuses what it was asked", exc_info=error)
+        return unexpected(request.scope, error)
     logger.error("the database: %s", error)
-    if full:
+    if is_out_of_room(error):
         kind = Kind("no-room", "The service has no room left on its disk", 507)
         return Problem(kind, request.scope, "database", "the disk is full", "make room on it")
     kind = Kind("database", "The database does not answer", 503, retry_after_s=10)

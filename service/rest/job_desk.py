@@ -13,6 +13,7 @@ from service.jobs.jobs import Jobs, JobSettings, Kind, alone
 from service.jobs.retention import Keep
 from service.jobs.screening.checks import limits_of
 from service.jobs.screening.kind import ScreeningKind
+from service.jobs.screening.rankings import Rankings
 from service.jobs.screening.watched import OnStored
 from service.jobs.training.kind import TrainingKind
 from service.jobs.uploads import Uploads
@@ -23,11 +24,12 @@ from service.settings import Settings
 
 @dataclass(frozen=True)
 class JobDesk:
-    """Jobs and the files sent ahead of them."""
+    """Jobs, the files sent ahead of them, and their rankings."""
 
     jobs: Jobs
     uploads: Uploads
     engine: Engine
+    rankings: Rankings
 
     @classmethod
     def opened(
@@ -58,8 +60,13 @@ class JobDesk:
         keep = Keep(settings.keep_jobs_days, settings.keep_uploads_days)
         how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes, keep)
         jobs = Jobs(database, data_folder, kinds, how, train_when_due)
-        uploads = Uploads(jobs.folders.uploads, settings.max_upload_bytes, settings.min_free_bytes)
-        return cls(jobs, uploads, engine)
+        uploads = Uploads(
+            jobs.folders.uploads,
+            settings.max_upload_bytes,
+            settings.min_free_bytes,
+            settings.max_uploads_bytes,
+        )
+        return cls(jobs, uploads, engine, Rankings())
 
     def close(self) -> None:
         """Stop: what runs is handed back."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from abc import ABC, abstractmethod
 from typing import Annotated, Any, Self, TypeVar
 
@@ -22,6 +23,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from service.field_values import nearest, remedy_for
+from service.records.jobs import LONGEST_NAME
 from service.rest.known_blades import KnownBlades
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
@@ -195,6 +197,20 @@ class MapQuestion(KeQuestion):
             if len(values) < 2 or (np.diff(values) <= 0).any():
                 remedy = "give two or more rising values for a chart, or accept application/json"
                 raise InvalidInput(field, values.tolist(), remedy)
+
+
+def check_job_name(name: str | None, settings: Settings) -> None:
+    """Refuse what no database holds as the name of a job, or no list shows.
+
+    Raises
+    ------
+    InvalidInput, TooLarge
+    """
+    if name is None:
+        return
+    check_length("name", name, min(settings.max_name_length, LONGEST_NAME), "shorten it")
+    if any(unicodedata.category(character) in ("Cc", "Cs") for character in name):
+        raise InvalidInput("name", name, "leave out control characters")
 
 
 def read_question(kind: type[Asked], data: Any, settings: Settings) -> Asked:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from anyio import CapacityLimiter, to_thread
 
 from service.operation.draining import Draining
-from service.operation.readiness import Check, DatabaseCheck, KeptCheck, disk_check
+from service.operation.readiness import Check, KeptCheck, database_check, folder_check
 from service.rest.active_model import Answering
 from service.rest.desk import Desk
 from service.rest.errors import Leaving, NotReady
@@ -30,10 +30,10 @@ class Readiness:
         self._of_model: tuple[Answering, KeptCheck] | None = None
         self._others: dict[str, KeptCheck] = {}
         # The disk first: where it is full, the database does not answer either, and is not what to mend.
-        if desk.settings.data_folder is not None:
-            self._others["disk"] = KeptCheck(self._disk)
+        if (folder := desk.settings.data_folder) is not None:
+            self._others["disk"] = KeptCheck(folder_check(folder, desk.settings.min_free_bytes))
         if desk.database is not None:
-            self._others["database"] = KeptCheck(DatabaseCheck(desk.database))
+            self._others["database"] = KeptCheck(database_check(desk.database))
         self.solver = ""
 
     async def checks(self) -> dict[str, Check]:
@@ -79,11 +79,6 @@ class Readiness:
         except NotReady as error:
             return Check(False, error.value, remedy=error.remedy)
         return Check(True, "surrogate and exact core gave a known answer")
-
-    async def _disk(self) -> Check:
-        settings = self._desk.settings
-        assert settings.data_folder is not None
-        return await to_thread.run_sync(disk_check, settings.data_folder, settings.min_free_bytes)
 
     def _audit(self) -> Check:
         """For information: taking every replica out of service would leave nobody to answer exactly."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -26,7 +25,7 @@ from service.jobs.job import FIRST_PRIORITY, LAST_PRIORITY, USUAL_PRIORITY
 from service.jobs.screening.request import Criteria
 from service.jobs.uploads import Uploads
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE_MAX, POLICY
-from service.rest.questions import checked_alpha, checked_policy, read_question, settings_of
+from service.rest.questions import check_job_name, checked_alpha, checked_policy, read_question, settings_of
 from service.screening.screen import KE_MAX as USUAL_KE_MAX
 from service.settings import Settings
 from service.sizes import TooLarge, check_length
@@ -261,10 +260,7 @@ class ScreeningQuestion(BaseModel):
             raise InvalidInput("ke_liner", self.ke_liner, f"give at most ke_max, {self.ke_max:g} N/m")
         if self.criteria.least_margin is not None and self.ke_liner is None:
             raise InvalidInput("criteria.least_margin", self.criteria.least_margin, "give ke_liner too")
-        if self.name is not None:
-            check_length("name", self.name, settings_of(info).max_name_length, "shorten it")
-            if any(unicodedata.category(character) in ("Cc", "Cs") for character in self.name):
-                raise InvalidInput("name", self.name, "leave out control characters")
+        check_job_name(self.name, settings_of(info))
         return self
 
     def documents(self, uploads: Uploads, owner: str | None, settings: Settings) -> Iterator[tuple[str, Any]]:

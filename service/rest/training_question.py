@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from service.jobs.training.request import TrainingRequest
-from service.rest.questions import read_question
+from service.rest.questions import check_job_name, read_question, settings_of
 from service.settings import Settings
 
 Json = dict[str, Any]
@@ -38,6 +38,11 @@ class TrainingQuestion(BaseModel):
     device: Literal["auto", "cpu", "cuda"] = "auto"
     with_served: bool = Field(False, description="Also train on what the service answered exactly.")
     promote: bool = Field(True, description="Make the model active, unless the gate refuses it.")
+
+    @model_validator(mode="after")
+    def _of_a_name_that_can_be_kept(self, info: ValidationInfo) -> Self:
+        check_job_name(self.name, settings_of(info))
+        return self
 
     @classmethod
     def read(cls, data: Any, settings: Settings) -> Self:

@@ -9,11 +9,18 @@ from types import SimpleNamespace
 import anyio
 import httpx
 import pytest
+from anyio import to_thread
 
 from service.app import create_app
 from service.operation.draining import Draining
-from service.operation.readiness import Check, DatabaseCheck, KeptCheck, disk_check
-from service.records.database import Database
+from service.operation.readiness import Check, KeptCheck, database_check, disk_check, folder_check
+from service.records.database import Database, open_database
+from service.records.keys import ApiKey, KeyStore, split_key
+from service.rest.desk import Desk
+from service.rest.errors import NotReady
+from service.rest.key_check import KeyCheck
+from service.rest.readiness import Readiness
+from service.roles import Role
 from service.settings import Settings
 
 
@@ -105,7 +112,7 @@ def test_a_database_that_never_answers_keeps_one_thread_and_no_probe_waiting():
         return free.wait(30.0)
 
     async def ask() -> list[bool]:
-        check = DatabaseCheck(SimpleNamespace(answers=answers, shown="db"), patience_s=0.05)
+        check = database_check(SimpleNamespace(answers=answers, shown="db"), patience_s=0.05)
         hung = [(await check()).ok for _ in range(10)]
         free.set()
         while check._asking.locked():
@@ -129,3 +136,75 @@ def test_a_service_about_to_stop_says_so_and_answers_all_the_same(serving, scree
         assert [answer.headers["connection"] for answer in answers] == ["close"] * 3
         assert answers[0].json() == before.json()
         assert "rubscreen_draining 1.0" in http.get("/metrics").text
+
+
+def test_a_folder_that_hangs_is_no_room(tmp_path, monkeypatch):
+    free = threading.Event()
+    monkeypatch.setattr("service.operation.readiness.disk_check", lambda *asked: free.wait(30.0))
+
+    async def ask() -> Check:
+        return await folder_check(tmp_path, 0, patience_s=0.05)()
+
+    found = anyio.run(ask)
+    free.set()
+    assert not found.ok and str(tmp_path) in found.detail
+
+
+def test_a_service_all_of_whose_threads_are_taken_is_ready_and_lets_keys_in(screener, tmp_path):
+    free = threading.Event()
+    desk = Desk.opened(Settings(data_folder=tmp_path, run_jobs=False), screener)
+    key, text = KeyStore(desk.database).create("office", Role.read)
+
+    async def ask() -> tuple[list[str], str]:
+        threads = to_thread.current_default_thread_limiter()
+        async with anyio.create_task_group() as group:
+            for _ in range(int(threads.total_tokens)):  # uploads to a disk that hangs, say
+                group.start_soon(to_thread.run_sync, free.wait)
+            while threads.available_tokens:
+                await anyio.sleep(0.01)
+            try:
+                with anyio.fail_after(20.0):
+                    checks = await Readiness(desk, Draining()).checks()
+                    return list(checks), (await desk.access.keys.check(text)).id
+            finally:
+                free.set()
+
+    try:
+        assert anyio.run(ask) == (["self_check", "disk", "database"], key.id)
+    finally:
+        desk.close()
+
+
+def test_a_database_that_swallows_questions_refuses_keys_in_time_and_knows_them_when_it_is_back(
+    tmp_path, monkeypatch
+):
+    database, free, asked, find = open_database(tmp_path), threading.Event(), [], KeyStore.find
+    store = KeyStore(database)
+    texts = [store.create(f"tool {i}", Role.read)[1] for i in range(10)]
+
+    def hangs(self: KeyStore, key_id: str) -> ApiKey | None:
+        asked.append(key_id)
+        free.wait(60.0)
+        return find(self, key_id)
+
+    async def ask() -> None:
+        keys = KeyCheck(store, patience_s=1.0)
+
+        async def refused(text: str) -> None:
+            with pytest.raises(NotReady, match="does not answer"):
+                await keys.check(text)
+
+        with anyio.fail_after(20.0):  # ten, one after the other, and then two at the same time
+            async with anyio.create_task_group() as group:
+                for text in texts:
+                    group.start_soon(refused, text)
+            await refused(texts[0])
+        assert len(asked) <= 2  # however many wait, no more threads than that hang
+        free.set()
+        for text in texts:
+            assert (await keys.check(text)).opened_by(split_key(text)[1])
+        keys.close()
+
+    monkeypatch.setattr(KeyStore, "find", hangs)
+    anyio.run(ask)
+    database.close()

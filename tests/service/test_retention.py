@@ -58,7 +58,7 @@ class Office:
     def upload(self, age: timedelta, content: bytes | None = None) -> str:
         writer = Uploads(self.folders.uploads, 10**6, 0).begin()
         writer.write(content or uuid.uuid4().bytes)
-        upload = writer.whole("blades.json", JSON, None)
+        upload = writer.whole("blades.json", JSON)
         writer.keep(upload)
         about = self.folders.uploads / upload.id / "about.json"
         os.utime(about, ((NOW - age).timestamp(),) * 2)
@@ -131,7 +131,7 @@ def test_a_file_that_is_sent_again_is_kept_from_then_on(office):
     assert Uploads(office.folders.uploads, 10**6, 0).get(sent, None).id == sent
     writer = Uploads(office.folders.uploads, 10**6, 0).begin()
     writer.write(b"[]")
-    again = writer.whole("blades.json", JSON, None)
+    again = writer.whole("blades.json", JSON)
     writer.keep(again)
     assert again.id == sent
     list(office.retention.delete(old))

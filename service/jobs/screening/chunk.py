@@ -10,11 +10,12 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from sdm_core.errors import RubscreenError
+from sdm_core.errors import Cancelled, RubscreenError
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import check_fit, check_line
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade, UnscreenedBlade
 from service.jobs.screening.request import ScreeningRequest
+from service.jobs.wanted import while_wanted
 from service.screening.batch import Failure
 from service.screening.screen import screen
 from service.settings import Settings
@@ -33,9 +34,16 @@ def chunk_payload(request: dict[str, Any], blades: Sequence[BladeLine], limits: 
 
 
 def compute_in_worker(payload: bytes) -> bytes:
-    """As `compute_chunk`, in a process for that alone: on one thread, and behind what answers people."""
+    """As `compute_chunk`, in a process for that alone: on one thread, and behind what answers people.
+
+    Raises
+    ------
+    Cancelled
+        When nobody waits for it any more.
+    """
     _be_modest()
-    return compute_chunk(payload)
+    with while_wanted():
+        return compute_chunk(payload)
 
 
 def compute_chunk(payload: bytes) -> bytes:
@@ -49,6 +57,8 @@ def compute_chunk(payload: bytes) -> bytes:
     ------
     InvalidInput
         When the model cannot be loaded.
+    Cancelled
+        When the surrounding `interruptible` block wants it to stop.
     """
     asked = json.loads(payload)
     request = ScreeningRequest.from_dict(asked["request"])
@@ -59,6 +69,8 @@ def compute_chunk(payload: bytes) -> bytes:
         line = BladeLine(**entry)
         try:
             screened.append(_screened(line, request, screener, limits))
+        except Cancelled:  # not a fault of the blade
+            raise
         except RubscreenError as error:
             unscreened.append(_unscreened(line, Failure.of(line.source, error).reason))
         except Exception as error:  # a fault of ours with one blade must not cost the others

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import orjson
 
 from sdm_core.blade import Blade, blade_from_dict, blade_to_dict
 from sdm_core.contact import ContactConfiguration
@@ -129,7 +130,7 @@ def rows_of(content: bytes) -> tuple[list[dict[str, Any]], list[UnscreenedBlade]
     """
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as npz:
-            meta = json.loads(npz[_META].tobytes())
+            meta = _meta(npz[_META].tobytes())
         rows = [
             {"blade_index": entry["index"], "source": entry["source"], **result["row"]}
             for entry in meta["screened"]
@@ -138,6 +139,14 @@ def rows_of(content: bytes) -> tuple[list[dict[str, Any]], list[UnscreenedBlade]
         return rows, [UnscreenedBlade(**entry) for entry in meta["unscreened"]]
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise DamagedFile("chunk", f"{len(content)} bytes", f"it is computed again ({error})") from None
+
+
+def _meta(text: bytes) -> dict[str, Any]:
+    """Four times as fast as `json` where it can: infinite error estimates are no JSON to orjson."""
+    try:
+        return orjson.loads(text)
+    except ValueError:
+        return json.loads(text)
 
 
 def _packed(result: ScreeningResult, place: str, arrays: dict[str, np.ndarray]) -> dict[str, Any]:

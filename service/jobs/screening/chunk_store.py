@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 
 from sdm_core.errors import DamagedFile
@@ -45,18 +45,24 @@ class ChunkStore:
         """Numbers of the chunks that are stored; their content is not looked at."""
         return set(self._paths())
 
+    def names(self) -> dict[int, str]:
+        """File names of the chunks that are stored: the same name has the same content."""
+        return {number: path.name for number, path in self._paths().items()}
+
     def verified(self) -> set[int]:
         """Numbers of the chunks that are whole; one that is not is taken away, to be computed again."""
-        whole = set()
-        for number, path in self._paths().items():
+        return {number for number, _ in self.whole()}
+
+    def whole(self) -> Iterator[tuple[int, bytes]]:
+        """(number, content) of every chunk that is whole, in order; taken away like `verified`."""
+        for number, path in sorted(self._paths().items()):
             try:
-                self._content(path)
+                content = self._content(path)
             except DamagedFile as error:
                 logger.error("%s", error)
                 path.unlink(missing_ok=True)
             else:
-                whole.add(number)
-        return whole
+                yield number, content
 
     def read(self, number: int) -> bytes:
         """A chunk.
@@ -71,8 +77,8 @@ class ChunkStore:
             raise DamagedFile("chunk", str(number), "it is not stored yet: wait for it, or retry the job")
         return self._content(path)
 
-    def each(self) -> Iterator[tuple[int, bytes]]:
-        """(number, content) of every stored chunk, in order.
+    def each(self, but: Container[int] = ()) -> Iterator[tuple[int, bytes]]:
+        """(number, content) of every stored chunk, in order, `but` those of some numbers.
 
         Raises
         ------
@@ -80,7 +86,8 @@ class ChunkStore:
             For the first that is not whole.
         """
         for number, path in sorted(self._paths().items()):
-            yield number, self._content(path)
+            if number not in but:
+                yield number, self._content(path)
 
     def _paths(self) -> dict[int, Path]:
         if not self._folder.is_dir():

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import RubscreenError
+from sdm_core.interruption import interruptible
 from service.jobs.control import Control
 from service.jobs.durable_files import check_room, is_full
 from service.jobs.engine import Engine, EngineGone, WorkerKilled
@@ -89,13 +90,17 @@ class ScreeningKind:
         request = ScreeningRequest.from_dict(asked)
         store = ChunkStore(folder.chunks)
         control.report(stage="looking at what is stored", now=True)
-        stored = store.verified()
+        # Each is read once: to look a single one up means to list them all.
+        stored = {}
+        for number, content in store.whole():
+            stored[number] = len(rows_of(content)[1])
+            control.check()
         tally = _Tally(sum(1 for _ in read_chunks(folder.path, 1)))
         left = []
         for number, blades in read_chunks(folder.path, request.blades_per_chunk):
             if number in stored:
                 tally.done += len(blades)
-                tally.not_screened += len(rows_of(store.read(number))[1])
+                tally.not_screened += stored[number]
             else:
                 left.append(number)
             control.check()
@@ -103,7 +108,8 @@ class ScreeningKind:
         control.report(stage="starting workers", now=True)
         self._compute(folder, asked, request, left, store, control, tally)
         control.report(stage="ranking", now=True)
-        self._keep(control, partial(write_results, folder, request))
+        with interruptible(control.check):  # 100,000 rows take some twenty seconds
+            self._keep(control, partial(write_results, folder, request))
         control.report(stage="", done=tally.done, now=True)
 
     def _compute(
@@ -167,8 +173,12 @@ class ScreeningKind:
         parts = []
         for blade in blades:
             alone = self._submit(asked, [blade], control)
-            while not wait([alone], _LOOK_EVERY_S).done:
-                control.check()
+            try:
+                while not wait([alone], _LOOK_EVERY_S).done:
+                    control.check()
+            except BaseException:
+                alone.cancel()
+                raise
             try:
                 parts.append(ChunkContent.from_bytes(self._engine.result(alone)))
             except WorkerKilled:

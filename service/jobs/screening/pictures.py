@@ -10,8 +10,8 @@ from service.jobs.errors import NotScreened
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade
 from service.jobs.screening.chunk_store import ChunkStore
+from service.jobs.screening.rankings import Ranking
 from service.jobs.screening.request import ScreeningRequest
-from service.jobs.screening.results import results
 from service.screening.batch import Failure, ScreenedBatch
 from service.screening.screen import ScreeningReport, ScreeningResult, risk
 
@@ -79,7 +79,9 @@ def boundaries_chart(blade: ScreenedBlade) -> bytes:
     return boundaries_png(blade.blade, curves, ke_max=first.ke_max, ke_liner=first.ke_liner)
 
 
-def report(folder: JobFolder, *, sheets: int, card: dict[str, Any] | None, made: datetime) -> bytes:
+def report(
+    folder: JobFolder, ranking: Ranking, *, sheets: int, card: dict[str, Any] | None, made: datetime
+) -> bytes:
     """The HTML report on the riskiest blades of a job.
 
     Raises
@@ -90,8 +92,7 @@ def report(folder: JobFolder, *, sheets: int, card: dict[str, Any] | None, made:
     from service.screening.html_report import html_report
 
     request = ScreeningRequest.from_dict(folder.request())
-    table, unscreened, _ = results(folder)
-    riskiest = dict.fromkeys(reversed(table["blade_index"].to_pylist()))
+    riskiest = dict.fromkeys(reversed(ranking.columns(["blade_index"])["blade_index"].to_pylist()))
     if not riskiest:
         raise NotScreened("job", folder.path.name, "there are no results yet, or no blade could be screened")
     chosen = sorted(list(riskiest)[:sheets])
@@ -101,7 +102,7 @@ def report(folder: JobFolder, *, sheets: int, card: dict[str, Any] | None, made:
         ScreeningReport(rows, rows[0].map.model, rows[0].boundary.solver),
         tuple(blade.blade for blade in blades),
         tuple(blade.source for blade in blades),
-        tuple(Failure(blade.source, blade.reason) for blade in unscreened),
+        tuple(Failure(blade.source, blade.reason) for blade in ranking.unscreened),
     )
     left_out = len(riskiest) - len(blades)
     page = html_report(batch, policy=request.policy, card=card, made=made, safer_left_out=left_out)

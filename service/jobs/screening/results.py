@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from sdm_core.errors import DamagedFile
+from sdm_core.interruption import checkpoint
 from service.jobs.durable_files import write_durably
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.chunk_content import UnscreenedBlade, rows_of
@@ -35,6 +35,10 @@ _TIP = pa.struct(
         )
     ]
 )
+# Rows of the file read together: a page needs one group or two of them.
+ROWS_IN_GROUP = 1000
+# Tables of chunks joined at a time: many small ones take up several times the room.
+JOIN_AT = 256
 SCHEMA = pa.schema(
     [
         ("rank", pa.int64()),
@@ -66,6 +70,7 @@ SCHEMA = pa.schema(
         ("critical_speeds", pa.list_(_TIP)),
     ]
 )
+UNRANKED = pa.schema(list(SCHEMA)[1:])
 
 
 def write_results(folder: JobFolder, request: ScreeningRequest) -> None:
@@ -77,64 +82,61 @@ def write_results(folder: JobFolder, request: ScreeningRequest) -> None:
         When it cannot be written.
     DamagedFile
         When a chunk is not whole.
+    Cancelled
+        When the surrounding `interruptible` block wants it to stop.
     """
-    rows, unscreened = stored_rows(folder)
-    write_durably(folder.path / FILE, to_parquet(ranked(rows, request.criteria), unscreened))
-
-
-def stored_rows(folder: JobFolder) -> tuple[list[dict[str, Any]], list[UnscreenedBlade]]:
-    """Rows of the chunks stored so far, in the order of the job, and the blades not screened.
-
-    Raises
-    ------
-    DamagedFile
-        When a chunk is not whole.
-    """
-    rows, unscreened = [], []
+    tables: list[pa.Table] = []
+    unscreened: list[UnscreenedBlade] = []
     for _, content in ChunkStore(folder.chunks).each():
-        more, failed = rows_of(content)
-        rows += more
+        checkpoint()
+        table, failed = table_of(content, request.criteria)
+        tables.append(table)
         unscreened += failed
-    return rows, unscreened
+        if len(tables) >= JOIN_AT:
+            tables = [joined(tables)]
+    write_durably(folder.path / FILE, to_parquet(ranked(joined(tables)), unscreened))
 
 
-def ranked(rows: Iterable[Mapping[str, Any]], criteria: Criteria) -> pa.Table:
-    """The ranking: largest least K_e first, then the smaller unstable share, as `screen.risk`."""
-
-    def risk(row: Mapping[str, Any]) -> tuple[float, float, int]:
-        smallest, share = row["smallest_unstable_ke"], row["unstable_share"]
-        least = math.inf if smallest is None else smallest
-        return -least, math.inf if share is None or math.isnan(share) else share, row["blade_index"]
-
-    ordered = sorted(rows, key=risk)
-    lines = [_line(rank, row, criteria) for rank, row in enumerate(ordered, 1)]
-    return pa.Table.from_pylist(lines, schema=SCHEMA)
-
-
-def results(folder: JobFolder) -> tuple[pa.Table, list[UnscreenedBlade], bool]:
-    """The ranking, the blades not screened, and whether that is all of the job.
+def table_of(content: bytes, criteria: Criteria) -> tuple[pa.Table, list[UnscreenedBlade]]:
+    """The rows of a chunk, not ranked yet (`UNRANKED`), and its blades that were not screened.
 
     Raises
     ------
     DamagedFile
-        When a file of the job is not whole.
+        When it is not what was written.
     """
-    path = folder.path / FILE
-    if path.is_file():
-        try:
-            table = pq.read_table(path, partitioning=None)
-        except (OSError, pa.ArrowException) as error:
-            raise DamagedFile(
-                "results", str(path), f"retry the job, which writes it again ({error})"
-            ) from None
-        return table, unscreened_of(table), True
-    rows, unscreened = stored_rows(folder)
-    return ranked(rows, ScreeningRequest.from_dict(folder.request()).criteria), unscreened, False
+    rows, unscreened = rows_of(content)
+    return pa.Table.from_pylist([_line(row, criteria) for row in rows], schema=UNRANKED), unscreened
 
 
-def unscreened_of(table: pa.Table) -> list[UnscreenedBlade]:
-    """The blades not screened, in the metadata of a table read from Parquet."""
-    said = json.loads((table.schema.metadata or {}).get(_UNSCREENED, b"[]"))
+def joined(tables: Sequence[pa.Table]) -> pa.Table:
+    """Tables of chunks as one, each column in one piece."""
+    return pa.concat_tables([UNRANKED.empty_table(), *tables]).combine_chunks()
+
+
+def rank_order(table: pa.Table) -> np.ndarray:
+    """Places of rows from the safest on: largest least K_e first, then the smaller unstable share.
+
+    As `screen.risk`; rows alike in both stand in the order of the job.
+    """
+    least = table["smallest_unstable_ke"].fill_null(np.inf).to_numpy()
+    share = table["unstable_share"].fill_null(np.inf).to_numpy()
+    return np.lexsort((table["blade_index"].to_numpy(), np.where(np.isnan(share), np.inf, share), -least))
+
+
+def with_ranks(table: pa.Table, ranks: np.ndarray) -> pa.Table:
+    """Rows of `UNRANKED` as those of `SCHEMA`."""
+    return table.add_column(0, SCHEMA.field("rank"), pa.array(ranks, pa.int64()))
+
+
+def ranked(table: pa.Table) -> pa.Table:
+    """The ranking of the rows of `joined`."""
+    return with_ranks(table.take(rank_order(table)), np.arange(1, table.num_rows + 1))
+
+
+def unscreened_of(schema: pa.Schema) -> list[UnscreenedBlade]:
+    """The blades not screened, in the metadata of a file of `to_parquet`."""
+    said = json.loads((schema.metadata or {}).get(_UNSCREENED, b"[]"))
     return [UnscreenedBlade(**entry) for entry in said]
 
 
@@ -142,7 +144,8 @@ def to_parquet(table: pa.Table, unscreened: Sequence[UnscreenedBlade]) -> bytes:
     """As a Parquet file; the blades not screened go into its metadata."""
     said = json.dumps([vars(blade) for blade in unscreened]).encode()
     buffer = io.BytesIO()
-    pq.write_table(table.replace_schema_metadata({_UNSCREENED: said}), buffer, compression="zstd")
+    kept = table.replace_schema_metadata({_UNSCREENED: said})
+    pq.write_table(kept, buffer, compression="zstd", row_group_size=ROWS_IN_GROUP)
     return buffer.getvalue()
 
 
@@ -175,11 +178,10 @@ def _inert(text: str | None) -> str | None:
     return f"'{text}" if text is not None and text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
-def _line(rank: int, row: Mapping[str, Any], criteria: Criteria) -> dict[str, Any]:
+def _line(row: Mapping[str, Any], criteria: Criteria) -> dict[str, Any]:
     worst = row["critical_speeds"][0] if row["critical_speeds"] else {}
     missed = criteria.missed(row)
     return {
-        "rank": rank,
         **{name: row[name] for name in ("blade_index", "source", "blade", "contact_name")},
         "contact": json.dumps(row["contact"]),
         "smallest_unstable_ke": row["smallest_unstable_ke"],

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import Annotated
 from urllib.parse import urlencode
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from fastapi import APIRouter, Header, Query
@@ -16,7 +17,8 @@ from starlette.responses import Response, StreamingResponse
 from sdm_core.errors import InvalidInput
 from service.jobs.job import SCREENING, Job
 from service.jobs.screening import pictures
-from service.jobs.screening.results import results, to_csv, to_parquet, to_rows
+from service.jobs.screening.rankings import Ranking
+from service.jobs.screening.results import SCHEMA, to_csv, to_parquet, to_rows
 from service.rest import replies
 from service.rest.accepting import (
     accept_screening,
@@ -162,31 +164,31 @@ async def screening_results(
         many = checked_limit(limit, MOST_ROWS, 100)
         first = checked_limit(offset, 10**8, 0, "offset", least=0)
         folder = desk.jobs.folders.of(job.id)
-        table, unscreened, complete = results(folder)
+        ranking, contacts = desk.rankings.of(folder), folder.request()["contacts"]
         asked = {"contact": contact, "verdict": verdict, "meets_criteria": meets_criteria}
-        table = _filtered(table, asked, folder.request()["contacts"])
         if form != JSON:
-            content = to_csv(table) if form == CSV else to_parquet(table, unscreened)
+            table = _filtered(ranking.columns(SCHEMA.names), asked, contacts)
+            content = to_csv(table) if form == CSV else to_parquet(table, ranking.unscreened)
             suffix = "csv" if form == CSV else "parquet"
             name = {"Content-Disposition": f'attachment; filename="screening-{job.id[:8]}.{suffix}"'}
             return Response(content, media_type=form, headers=_VARY | name)
-        following = None
-        if first + many < table.num_rows:
+        places, following = _places(ranking, asked, contacts), None
+        if first + many < len(places):
             query = {k: v for k, v in asked.items() if v is not None}
             query |= {"offset": str(first + many), "limit": str(many)}
             following = f"/v1/screenings/{job.id}/results?{urlencode(query)}"
         document = {
             "job": job.id,
-            "complete": complete and job.state.finished,
-            "total": table.num_rows,
+            "complete": ranking.complete and job.state.finished,
+            "total": len(places),
             "offset": first,
-            "results": to_rows(table.slice(first, many)),
-            "not_screened": [vars(blade) for blade in unscreened[:1000]],
+            "results": to_rows(ranking.at(places[first : first + many])),
+            "not_screened": [vars(blade) for blade in ranking.unscreened[:1000]],
             "next": following,
         }
         return Response(replies.to_json(document), media_type=JSON, headers=_VARY)
 
-    # In the queue of work: a table of many thousand rows takes a second to read.
+    # In the queue of work: a table of many thousand rows takes a second to write as CSV.
     return await service.work.run(make, request)
 
 
@@ -205,7 +207,8 @@ async def screening_report(request: Request, job_id: str, sheets: str | None = N
         job = desk.jobs.get(job_id, SCREENING)
         folder = desk.jobs.folders.of(job.id)
         made = job.finished_at or datetime.now(UTC)
-        return pictures.report(folder, sheets=many, card=service.card(folder.request()["model"]), made=made)
+        card, ranking = service.card(folder.request()["model"]), desk.rankings.of(folder)
+        return pictures.report(folder, ranking, sheets=many, card=card, made=made)
 
     page = await service.work.run(make, request)
     policy = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:"}
@@ -246,6 +249,14 @@ async def _picture(request: Request, job_id: str, index: str, contact: str | Non
         return pictures.map_chart(pictures.contact_result(blade, contact))
 
     return Response(await service.work.run(make, request), media_type=PNG)
+
+
+def _places(ranking: Ranking, asked: dict[str, str | None], contacts: Iterable[str] | None) -> np.ndarray:
+    """Where the rows that fit are in the ranking; it reads no more than the filters look at."""
+    if all(value is None for value in asked.values()):
+        return np.arange(ranking.rows)
+    columns = ranking.columns(["rank", "contact_name", "verdict", "meets_criteria"])
+    return _filtered(columns, asked, contacts)["rank"].to_numpy() - 1
 
 
 def _filtered(table: pa.Table, asked: dict[str, str | None], contacts: Iterable[str] | None) -> pa.Table:

@@ -94,7 +94,7 @@ async def schedule_trainings(request: Request, body: TheJson) -> Response:
         _check_served(request, training)
         asked = replace(training.request(0), seed=training.seed or 0).to_dict()
         owner = {"owner": caller.key_id, "owner_name": None if caller.key_id is None else caller.name}
-        desk.jobs.queue.schedule(ask.cron, ask.timezone, {"training": asked, **owner})
+        desk.jobs.calendar.schedule(ask.cron, ask.timezone, {"training": asked, **owner})
         return _schedule(request)
 
     return await service.work.run(put, request)
@@ -109,7 +109,7 @@ def see_schedule(request: Request) -> Response:
 @router.delete("/schedule", response_model=ScheduleReply, responses=problems(500, 503), dependencies=[ADMIN])
 def drop_schedule(request: Request) -> Response:
     """Train by the calendar no longer."""
-    the_jobs(request).jobs.queue.unschedule()
+    the_jobs(request).jobs.calendar.unschedule()
     return _schedule(request)
 
 
@@ -169,7 +169,7 @@ def _check_served(request: Request, ask: TrainingQuestion) -> None:
 
 
 def _schedule(request: Request) -> Response:
-    found = the_jobs(request).jobs.queue.scheduled()
+    found = the_jobs(request).jobs.calendar.scheduled()
     document = {
         "cron": None if found is None else found.cron,
         "timezone": None if found is None else found.timezone,

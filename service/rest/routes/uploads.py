@@ -45,6 +45,9 @@ async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
 
     It is read to its end before it is answered: what is no JSON, no whole zip, or has no blade in it is
     refused, by line or member, and not kept. The first blade that cannot be used is told as `fault`.
+
+    All files of one key together take up at most `max_uploads_bytes`; the same file sent again counts once.
+    One too many is answered 507 (type `urn:rubscreen:problem:upload-quota`); `uploads` lists the largest.
     """
     desk, service = the_jobs(request), the_desk(request)
     settings = service.settings
@@ -52,7 +55,8 @@ async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
     check_length("name", name, settings.max_name_length, "shorten it")
     announced = request.headers.get("content-length", "")
     size = int(announced) if announced.isdecimal() else 0
-    writer = await to_thread.run_sync(desk.uploads.begin, size)
+    owner = the_caller(request).key_id
+    writer = await to_thread.run_sync(desk.uploads.begin, size, owner)
     try:
         # As much time for each part of it as a whole body has.
         stream = request.stream()
@@ -67,7 +71,7 @@ async def send_file(request: Request, name: str = _UNNAMED) -> UploadReply:
                 break
             if part:
                 await to_thread.run_sync(writer.write, part)
-        upload = await to_thread.run_sync(writer.whole, name, form, the_caller(request).key_id)
+        upload = await to_thread.run_sync(writer.whole, name, form)
 
         def looked_at() -> Contents:
             return contents(name, writer.documents(upload, settings.max_job_blades), settings)

@@ -18,7 +18,7 @@ from service.jobs.errors import NoRoom, UnderWay
 from service.jobs.job import SCREENING, TRAINING, Job, State
 from service.jobs.job_folder import JobFolder
 from service.jobs.jobs import Jobs, JobSettings
-from service.records.database import Database, database_url
+from service.records.database import PATIENCE, Database, database_url
 
 
 class Counting:
@@ -200,45 +200,6 @@ def test_two_processes_do_not_share_a_folder_with_sqlite(tmp_path):
         Jobs(database, tmp_path, {}, JobSettings({}))
 
 
-def test_a_schedule_is_kept_over_a_restart_and_calls_when_it_is_due(database, tmp_path):
-    due: list[tuple[str, dict]] = []
-
-    def tick(jobs: Jobs, at: str, context: dict) -> None:
-        due.append((at, context))
-
-    def opened() -> Jobs:
-        kinds = {SCREENING: Counting(), TRAINING: Counting()}
-        return Jobs(database, tmp_path, kinds, JobSettings({SCREENING: 1}), tick)
-
-    jobs = opened()
-    try:
-        for cron, timezone in (("daily", "UTC"), ("* * * * * *", "UTC"), ("0 3 * * *", "Mars/Olympus")):
-            with pytest.raises(InvalidInput):
-                jobs.queue.schedule(cron, timezone, {})
-        assert jobs.queue.scheduled() is None
-        jobs.queue.schedule("0 3 * * SUN", "Europe/Paris", {"training": {"seed": 1}})
-    finally:
-        jobs.close()
-    jobs = opened()
-    try:
-        found = jobs.queue.scheduled()
-        assert (found.cron, found.timezone, found.context) == (
-            "0 3 * * SUN",
-            "Europe/Paris",
-            {"training": {"seed": 1}},
-        )
-        assert (found.coming.isoweekday(), found.coming.hour, found.coming.minute) == (7, 3, 0)
-        from dbos import DBOS
-
-        DBOS.trigger_schedule("training")  # as the clock would
-        wait_for(lambda: len(due) == 1)
-        assert due[0][1] == {"training": {"seed": 1}}
-        jobs.queue.unschedule()
-        assert jobs.queue.scheduled() is None
-    finally:
-        jobs.close()
-
-
 @needs_postgres
 def test_nothing_in_the_queue_is_pickled(postgres_url, tmp_path):
     import psycopg
@@ -259,3 +220,17 @@ def test_nothing_in_the_queue_is_pickled(postgres_url, tmp_path):
     database.close()
     assert any('"args": ["' + accepted.id in row for row in rows)
     assert not any("gASV" in row for row in rows)  # how a pickle begins, in base64
+
+
+@needs_postgres
+def test_connections_of_the_queue_give_up_a_server_that_hangs_as_ours_do(postgres_url, tmp_path):
+    from dbos._dbos import _get_dbos_instance
+
+    database = Database(database_url(postgres_url, tmp_path))
+    with jobs_of(database, tmp_path, Counting()):
+        for engine in (database.engine, _get_dbos_instance()._sys_db.engine):
+            with engine.connect() as connection:
+                told = connection.connection.driver_connection.info.get_parameters()
+                assert {name: int(told[name]) for name in PATIENCE} == PATIENCE
+                assert PATIENCE["connect_timeout"] < 10 and PATIENCE["tcp_user_timeout"] <= 10_000
+    database.close()

@@ -22,8 +22,8 @@ from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade
 from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.kind import ScreeningKind
+from service.jobs.screening.rankings import Rankings
 from service.jobs.screening.request import ScreeningRequest
-from service.jobs.screening.results import results
 
 
 class FakeEngine:
@@ -112,9 +112,9 @@ def run(folder: JobFolder, engine: FakeEngine, reserve_bytes: int = 0) -> Told:
 
 
 def unscreened(folder: JobFolder) -> list[UnscreenedBlade]:
-    table, found, complete = results(folder)
-    assert complete and table.num_rows == 0
-    return found
+    ranking = Rankings().of(folder)
+    assert ranking.complete and ranking.rows == 0
+    return ranking.unscreened
 
 
 def test_every_blade_is_asked_about_once_and_told_in_order(tmp_path):

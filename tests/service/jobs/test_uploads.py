@@ -23,10 +23,10 @@ def uploads(tmp_path) -> Uploads:
 def sent(
     uploads: Uploads, content: bytes, form: str, name: str = "batch", owner: str | None = "k1"
 ) -> Upload:
-    writer = uploads.begin(len(content))
+    writer = uploads.begin(len(content), owner)
     for start in range(0, len(content), 7):
         writer.write(content[start : start + 7])
-    upload = writer.whole(name, form, owner)
+    upload = writer.whole(name, form)
     writer.keep(upload)
     return upload
 
