@@ -163,6 +163,8 @@ class DaskEngine:
             "distributed.comm.timeouts.connect": f"{_CONNECT_S}s",
             # Samples of what workers do, kept as they run: nobody looks at them, and workers grew meanwhile.
             "distributed.worker.profile.enabled": False,
+            # The last thousand messages to each worker, kept whole: with chunks in them, hundreds of MiB.
+            "distributed.admin.low-level-log-length": 0,
         }
         security = None
         if self._tls is not None:
@@ -170,23 +172,24 @@ class DaskEngine:
             for role in ("client", "scheduler", "worker"):
                 files |= {f"tls_{role}_cert": self._tls.cert_file, f"tls_{role}_key": self._tls.key_file}
             security = Security(require_encryption=True, **{name: str(path) for name, path in files.items()})
-        with dask.config.set(settings):
-            if self._address is None:
-                self._scratch.mkdir(parents=True, exist_ok=True)
-                # Other users of this machine reach the loopback too: they have none of these certificates.
-                security = Security.temporary()
-                self._cluster = LocalCluster(
-                    n_workers=self._workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",
-                    local_directory=str(self._scratch),
-                    silence_logs=logging.CRITICAL,
-                    security=security,
-                )
-            where = self._cluster if self._address is None else self._address
-            self._client = Client(where, security=security, timeout=_CONNECT_S, set_as_default=False)
+        # For good: workers that take the place of dead ones are to have them too.
+        dask.config.set(settings)
+        if self._address is None:
+            self._scratch.mkdir(parents=True, exist_ok=True)
+            # Other users of this machine reach the loopback too: they have none of these certificates.
+            security = Security.temporary()
+            self._cluster = LocalCluster(
+                n_workers=self._workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                local_directory=str(self._scratch),
+                silence_logs=logging.CRITICAL,
+                security=security,
+            )
+        where = self._cluster if self._address is None else self._address
+        self._client = Client(where, security=security, timeout=_CONNECT_S, set_as_default=False)
         self._executor = self._client.get_executor()
         logger.info("chunks are computed by %s", self.where)
 
