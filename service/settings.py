@@ -66,7 +66,7 @@ class Settings(BaseSettings):
     max_upload_bytes
         Size of one file of blades.
     max_uploads_bytes
-        Size of all files of blades of one key together; 0, and who needs no key, is as many as the disk holds.
+        Size of all files of blades of one key together; 0 is as many as the disk holds, as without keys.
     max_job_blades
         Blades of one screening.
     max_job_contacts
