@@ -1,0 +1,1 @@
+"""The independent witness: motion integrated in time, sharing nothing with the stability solvers."""
