@@ -86,7 +86,7 @@ class AbradableLiner:
     >>> round(liner.elastic_recovery, 3)
     0.05
     >>> [round(ke) for ke in liner.cutting_stiffness(liner.bars(1))]
-    [11172]
+    [11173]
 
     References
     ----------
