@@ -51,6 +51,14 @@ class TooMuchWork(InvalidInput):
     """More exact work than one call may ask for."""
 
 
+class LinerWornThrough(InvalidInput):
+    """A simulated blade has cut through its abradable liner."""
+
+
+class NotConverged(RubscreenError):
+    """An iteration did not reach its accuracy."""
+
+
 class Cancelled(RubscreenError):
     """The caller asked for the work to stop."""
 

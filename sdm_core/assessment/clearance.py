@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdm_core.assessment.tip_motion import over_speed, tip_motion
+from sdm_core.assessment.tip_motion import tip_motion
 from sdm_core.blade import Blade
+from sdm_core.blade.over_speed import over_speed
 from sdm_core.errors import InvalidInput
 from sdm_core.lobe_tips import check_range
 from sdm_core.validation import number, vector

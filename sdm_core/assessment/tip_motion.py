@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from sdm_core.blade import Blade
+from sdm_core.blade.over_speed import over_speed
 
 # Below this slope of the tip line the casing-normal amplitude hardly holds any axial motion, and
 # taking it from there would magnify the error of the slope more than twentyfold.
@@ -100,21 +100,6 @@ def tip_motion(blade: Blade, speed_hz: np.ndarray) -> TipMotion:
         if shape is None
     ]
     return TipMotion(contact, radial, tangential, axial, derived, tuple(missing))
-
-
-def over_speed(blade: Blade, key: str, speed_hz: np.ndarray) -> np.ndarray | None:
-    """One optional entry of the blade's states at rotor speeds; None where a state lacks it.
-
-    Not-a-knot in Ω², as `Blade.at_speeds` interpolates. Shape (m, ...) of the entry's own.
-    """
-    values = [getattr(state, key) for state in blade.states]
-    if any(value is None for value in values):
-        return None
-    at = np.atleast_1d(np.asarray(speed_hz, dtype=float))
-    table = np.array(values, dtype=float)
-    if len(values) == 1:
-        return np.broadcast_to(table[0], (len(at), *table.shape[1:])).copy()
-    return CubicSpline([state.speed_hz**2 for state in blade.states], table)(at**2)
 
 
 def _casing_slope(blade: Blade) -> np.ndarray | None:
