@@ -25,6 +25,7 @@ MEASUREMENTS = {
     "gradients": "benchmarks.gradients",
     "speed": "benchmarks.map_speed",
     "audit": "benchmarks.audit",
+    "extensions": "benchmarks.model_extensions",
 }
 
 
