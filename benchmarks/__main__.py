@@ -25,6 +25,7 @@ MEASUREMENTS = {
     "gradients": "benchmarks.gradients",
     "speed": "benchmarks.map_speed",
     "audit": "benchmarks.audit",
+    "liner": "benchmarks.time_domain_liner",
 }
 
 
