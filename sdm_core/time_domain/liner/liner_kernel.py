@@ -54,8 +54,8 @@ class Tip(NamedTuple):
     observed, contact, tangential
         As in `TipModes`.
     compliance, sideways
-        V_cᵀ diag(push) V_c / 2 and μ V_cᵀ diag(push) V_t / 2: displacement in a step per force at its end, m/N, each
-        of shape (r, r).
+        V_cᵀ diag(push) V_c / 2 and μ V_cᵀ diag(push) V_t / 2: displacement in a step per force at its end,
+        m/N, each of shape (r, r).
     friction
         μ.
     rim_speed
