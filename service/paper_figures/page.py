@@ -16,7 +16,7 @@ INTRODUCTION = (
     "The paper's blade is not public, so its figures cannot be redrawn: what can be compared is what they "
     "say. Every line below follows from the numbers of the figure beside it; those are in figures.json. "
     "Boundaries are the exact ones of the delay equation, except where Fig. 7 draws the paper's method. "
-    "Fig. 6 integrates that equation in time, and Figs. 11, 12 and 14 a blade against a liner of plastic bars. "
+    "Fig. 6 integrates that equation in time, Figs. 11, 12 and 14 a blade against a liner of plastic bars. "
     "Speeds are drawn from Ω/f₁ = 0.05, below which lobes cannot be told apart. Figures 5, 9 and 10 keep "
     "all modes of the blade, the paper two. Where modal data end before Ω/f₁ = 0.45 they are extrapolated "
     "in Ω² and hatched; what is said leaves that out."
