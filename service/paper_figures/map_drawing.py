@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from service.paper_figures.lobe_drawing import DPI, shortened
 from service.paper_figures.map_figure import MapFigure
@@ -39,9 +38,14 @@ def map_png(figure: MapFigure) -> bytes:
         )
         key.append(made)
     if figure.extrapolated_from is not None and figure.extrapolated_from < figure.ratio[-1]:
-        axes.axvline(figure.extrapolated_from, color="#2a6fbb", lw=0.9, ls=":")
         key.append(
-            Patch(facecolor="none", edgecolor="#2a6fbb", ls=":", label="right of it: modal data extrapolated")
+            axes.axvline(
+                figure.extrapolated_from,
+                color="#2a6fbb",
+                lw=1.0,
+                ls=":",
+                label="right of it: modal data extrapolated",
+            )
         )
     axes.set_xlim(figure.ratio[0], figure.ratio[-1])
     axes.set_ylim(figure.height[0], figure.height[-1])

@@ -18,7 +18,7 @@ from service.paper_figures.study import Study
 
 REVOLUTIONS = 50
 """[SBL] 5.1."""
-SPEEDS, CELLS, ANGLES, LINES = 200, 4000, 500, 401
+SPEEDS, CELLS, ANGLES, LINES = 200, 4000, 500, 801
 HIGHEST_FREQUENCY = 6.0
 """Of the spectra, over f₁; [SBL] Fig. 14 sees nothing above 5."""
 
