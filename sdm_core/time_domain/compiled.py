@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from numba import njit
 
@@ -16,7 +16,10 @@ def compiled(function: Function) -> Function:
     What was compiled is kept beside the source or in the user's cache. A service that may write to neither
     compiles once a process instead.
     """
+    # Called as the function is; numba's own type says less about that.
+    machine_code: Any
     try:
-        return njit(cache=True, nogil=True)(function)
+        machine_code = njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba finds no folder that it may write to
-        return njit(nogil=True)(function)
+        machine_code = njit(nogil=True)(function)
+    return machine_code

@@ -75,7 +75,7 @@ def all_figures(studies: list[Study], progress: Progress = lambda *_: None) -> I
             count += 1
             progress(count, total, f"{name}, {what}")
 
-        figures = []
+        figures: list[PaperFigure] = []
         for draw in (*quick, bending_and_torsion):
             figures.append(draw(study))
             done(f"Fig. {figures[-1].number}")
