@@ -10,6 +10,7 @@ from typing import Any
 
 SCREENING, TRAINING = "screening", "training"
 KINDS = (SCREENING, TRAINING)
+LONGEST_NAME = 200  # characters
 # 1 is first.
 FIRST_PRIORITY, USUAL_PRIORITY, LAST_PRIORITY = 1, 5, 9
 
