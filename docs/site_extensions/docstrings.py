@@ -1,7 +1,7 @@
 """Docstrings as they are meant: plain text with equations, not reStructuredText.
 
-The code writes |μ|, K_e* and indented equations as one reads them. Here they are made safe for the parser: bars and
-asterisks are escaped, an indented equation becomes a literal block.
+The code writes |μ|, K_e* and indented equations as one reads them. Here they are made safe for the parser:
+bars and asterisks are escaped, an indented equation becomes a literal block.
 """
 
 from __future__ import annotations
