@@ -30,7 +30,7 @@ default_role = "code"
 smartquotes = False  # what is said of code is to be found as it was written
 highlight_language = "text"
 
-myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline"]
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline", "colon_fence"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
 
@@ -48,6 +48,7 @@ napoleon_use_rtype = False
 nitpick_ignore_regex = [(r"py:.*", r".*")]
 
 html_theme = "furo"
+pygments_dark_style = "github-dark"
 html_title = f"rubscreen {release}"
 html_math_renderer = "mathml"
 html_static_path = ["static"]

@@ -113,7 +113,7 @@ def _forms(content: dict[str, Any]) -> str:
 
 def _form(part: dict[str, Any]) -> str:
     schema = part.get("schema", {})
-    return f"{_type(schema)}. {schema.get('description', '')}".rstrip(". ") or "any"
+    return ". ".join(said for said in (_type(schema), schema.get("description", "")) if said) or "any"
 
 
 def _forms_in_a_cell(content: dict[str, Any]) -> str:
@@ -130,7 +130,7 @@ def _example(content: dict[str, Any]) -> list[str]:
     return [f"```json\n{_folded(example)}\n```\n"]
 
 
-def _folded(value: Any, indent: int = 0, width: int = 100) -> str:
+def _folded(value: Any, indent: int = 0, width: int = 88) -> str:
     """JSON with short lists and objects on one line."""
     flat = json.dumps(value, ensure_ascii=False)
     if len(flat) + indent <= width or not isinstance(value, dict | list):

@@ -160,6 +160,14 @@ def test_equations_need_no_script_and_every_letter_is_in_the_font_that_is_shippe
     assert not any(r"\mathbf" in path.read_text(encoding="utf-8") for path in pages)
 
 
+def test_no_markup_is_left_over_on_a_page(pages):
+    for path in pages:
+        text = re.sub(r"<(pre|code|script)\b.*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        assert not re.search(
+            r":::|\$\$|\{eq\}|\]\(|<!-- (rest|command)-", re.sub(r"<[a-z][^>]*>", "", text)
+        ), path
+
+
 def italics(letter: str) -> str:
     """What a browser draws for a single letter in <mi>."""
     if letter == "h":
