@@ -15,8 +15,9 @@ from sdm_core.time_domain.liner import plain_revolution
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner, Friction
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
 from sdm_core.time_domain.liner.rub_history import RubHistory
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, run_revolutions, simulate_rub
+from sdm_core.time_domain.liner.simulation import run_revolutions, simulate_rub
 
 FAR = Casing(0.25, 0.1)
 SOFT = AbradableLiner.from_cutting_stiffness(1e4, elastic_recovery=0.05)
