@@ -40,6 +40,12 @@ def _write(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] = source[0].replace(PLACE, reference())
 
 
+def _always(app: Sphinx, *_: Any) -> list[str]:
+    """The page is read at every build: what it says comes from modules that Sphinx does not watch."""
+    return [PAGE]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("source-read", _write)
+    app.connect("env-get-outdated", _always)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
