@@ -26,6 +26,7 @@ MEASUREMENTS = {
     "speed": "benchmarks.map_speed",
     "audit": "benchmarks.audit",
     "extensions": "benchmarks.model_extensions",
+    "liner": "benchmarks.time_domain_liner",
 }
 
 

@@ -23,7 +23,7 @@ _STABLE_PHASE = 2.0  # rad: beyond it a mode grows without any force
 class Scheme(NamedTuple):
     """The coefficients of one step, as the kernel takes them.
 
-        x_{n+1} = carry · x_n − drag · x_{n−1} − push · (V_c + μ s V_t) F_{n+1}
+        x_{n+1} = carry · x_n − drag · x_{n−1} − push · (V_c + μ s V_t)(F_{n−1} + F_{n+1})/2
 
     Attributes
     ----------
@@ -49,14 +49,17 @@ class Scheme(NamedTuple):
 class CentralDifferences:
     """Central differences with prediction and correction of contact, constant whole steps per revolution.
 
-        (x_{n+1} − 2x_n + x_{n−1})/h² + 2ξΛ(x_{n+1} − x_{n−1})/2h + Λ²x_n = −V_c F_{n+1}
+        (x_{n+1} − 2x_n + x_{n−1})/h² + 2ξΛ(x_{n+1} − x_{n−1})/2h + Λ²x_n = −V_c (F_{n−1} + F_{n+1})/2
 
-    is solved without contact first (prediction); then the forces F_{n+1} of the bars are found that belong
-    to the displacements they correct. Free motion is of second order in h and stable for ω h < 2; because
-    the forces are taken at the end of the step, contact adds no limit to h, and is of first order.
+    is solved with F_{n+1} = 0 first (prediction); then the forces F_{n+1} of the bars are found that belong
+    to the displacements u_{n+1} they correct. Free motion is of second order in h and stable for ω h < 2. The
+    mean of the forces around t_n is of second order too; with F_{n+1} alone, the usual choice, a bar of
+    stiffness k would damp like a dashpot kh, more than most blades do. On an elastic bar the work over the
+    step is that of a potential, (u²_{n+1} − u²_{n−1})k/4, so that contact neither feeds the motion nor limits
+    h; jumps of the force, where a bar yields or a cell ends, leave errors of first order there.
 
     A bar that is unloaded within its cell loses what it held: cells of finite length damp, like a tip of
-    finite thickness does, by (AE/L − K_e)(1 − 1/s)/4Ω·cells N s/m with s steps a cell
+    finite thickness does, by (AE/L − K_e)(1 − 1/s)/(4Ω · cells), N s/m, with s steps a cell
     (`cell_damping_ratio`). It vanishes with many cells, and with one step a cell.
 
     Parameters

@@ -18,8 +18,7 @@ class EnergyAccount:
     kinetic and strain energy to second order in h. Multiplying the scheme by (x_{n+1} − x_{n−1})/2 shows
     that E_{n+½} − E_{n−½} is half the work of damping, contact and friction over the displacement from
     x_{n−1} to x_{n+1}: exactly, so that `imbalance_j` is rounding, whatever the step. That work is in
-    turn the integral of force times velocity, to first order in h where there is contact, to second order
-    without.
+    turn the integral of force times velocity to second order in h, where the force does not jump.
 
     Attributes
     ----------

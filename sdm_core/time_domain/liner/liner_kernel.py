@@ -25,8 +25,9 @@ class Motion(NamedTuple):
         Modal coordinates at the last two instants, kg^½ m, each of shape (n,).
     worn
         Depth removed under each contact node in each cell, m, shape (r, cells).
-    force
-        Contact forces at the last instant, N, shape (r,).
+    force, sliding
+        Contact and friction forces (towards negative tangential) at the last instant and, in the second row,
+        the one before, N, each of shape (2, r).
     impulse
         Sum of the contact forces of all steps since the last sample, N, shape (r,).
     work
@@ -39,6 +40,7 @@ class Motion(NamedTuple):
     before: np.ndarray
     worn: np.ndarray
     force: np.ndarray
+    sliding: np.ndarray
     impulse: np.ndarray
     work: np.ndarray
     peak: np.ndarray
@@ -52,7 +54,8 @@ class Tip(NamedTuple):
     observed, contact, tangential
         As in `TipModes`.
     compliance, sideways
-        V_cᵀ diag(push) V_c and μ V_cᵀ diag(push) V_t: displacement of a step per force, m/N, shape (r, r).
+        V_cᵀ diag(push) V_c / 2 and μ V_cᵀ diag(push) V_t / 2: displacement in a step per force at its end,
+        m/N, each of shape (r, r).
     friction
         μ.
     rim_speed
@@ -137,8 +140,9 @@ def one_revolution(
     How it ended (`DONE`, `WORN_THROUGH`, `NOT_CONVERGED`), at which contact node and cell, and the most
     rounds that a correction took.
     """
-    now, before, worn, force = motion.now, motion.before, motion.worn, motion.force
-    modes, nodes, tips = len(now), len(force), tip.observed.shape[1]
+    now, before, worn = motion.now, motion.before, motion.worn
+    modes, nodes, tips = len(now), len(worn), tip.observed.shape[1]
+    free, force = np.empty(modes), np.empty(nodes)
     inside, h, every = scheme.steps_per_cell, scheme.step, samples.every
     fresh, shortening, slides = np.zeros(nodes), np.empty(nodes), np.ones(nodes)
     yields = np.zeros(nodes, dtype=np.bool_)
@@ -153,8 +157,9 @@ def one_revolution(
                 for i in range(nodes):
                     samples.force[k // every, i] = motion.impulse[i] / every
                     motion.impulse[i] = 0.0
-            # Prediction: where the tip would be without contact.
+            # Prediction: where the tip would be if no contact were left at the end of the step.
             for i in range(nodes):
+                force[i] = motion.force[0, i]
                 shortening[i] = -gap[i, cell]
                 slip = tip.rim_speed
                 if tip.friction > 0.0:
@@ -162,9 +167,14 @@ def one_revolution(
                         slip += tip.tangential[j, i] * (now[j] - before[j]) / h
                     slides[i] = 1.0 if slip >= 0.0 else -1.0
             for j in range(modes):
-                free = scheme.carry[j] * now[j] - scheme.drag[j] * before[j]
+                free[j] = scheme.carry[j] * now[j] - scheme.drag[j] * before[j]
                 for i in range(nodes):
-                    shortening[i] += tip.contact[j, i] * free
+                    held = (
+                        tip.contact[j, i] * motion.force[1, i] + tip.tangential[j, i] * motion.sliding[1, i]
+                    )
+                    free[j] -= 0.5 * scheme.push[j] * held
+                for i in range(nodes):
+                    shortening[i] += tip.contact[j, i] * free[j]
             # Correction: round the nodes until their forces agree. One node needs one round.
             touched = False
             for i in range(nodes):
@@ -179,14 +189,14 @@ def one_revolution(
                     rounds += 1
                     change, largest = 0.0, 0.0
                     for i in range(nodes):
-                        free = shortening[i]
+                        reach = shortening[i]
                         for other in range(nodes):
                             if other != i:
                                 give = tip.compliance[i, other] + slides[other] * tip.sideways[i, other]
-                                free -= give * force[other]
+                                reach -= give * force[other]
                         own = tip.compliance[i, i] + slides[i] * tip.sideways[i, i]
                         found, yields[i] = bar_force(
-                            free,
+                            reach,
                             own,
                             worn[i, cell],
                             fresh[i],
@@ -203,14 +213,14 @@ def one_revolution(
                         return NOT_CONVERGED, 0, cell, rounds
                 most_rounds = max(most_rounds, rounds)
             for j in range(modes):
-                inward, against = 0.0, 0.0
-                if touched:
-                    for i in range(nodes):
-                        inward += tip.contact[j, i] * force[i]
-                        against += slides[i] * tip.tangential[j, i] * force[i]
-                    against *= tip.friction
-                free = scheme.carry[j] * now[j] - scheme.drag[j] * before[j]
-                after = free - scheme.push[j] * (inward + against)
+                after, inward, against = free[j], 0.0, 0.0
+                for i in range(nodes):
+                    sliding = tip.friction * slides[i] * force[i]
+                    after -= (
+                        0.5 * scheme.push[j] * (tip.contact[j, i] * force[i] + tip.tangential[j, i] * sliding)
+                    )
+                    inward += 0.5 * tip.contact[j, i] * (force[i] + motion.force[1, i])
+                    against += 0.5 * tip.tangential[j, i] * (sliding + motion.sliding[1, i])
                 moved = after - before[j]
                 motion.work[0] -= scheme.loss[j] * moved * moved / (4.0 * h)
                 motion.work[1] -= 0.5 * inward * moved
@@ -221,6 +231,9 @@ def one_revolution(
                 before[j] = now[j]
                 now[j] = after
             for i in range(nodes):
+                motion.force[1, i], motion.force[0, i] = motion.force[0, i], force[i]
+                motion.sliding[1, i] = motion.sliding[0, i]
+                motion.sliding[0, i] = tip.friction * slides[i] * force[i]
                 motion.impulse[i] += force[i]
                 if yields[i]:
                     reached = -gap[i, cell] - force[i] / bars.elastic[i]

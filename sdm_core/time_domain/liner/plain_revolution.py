@@ -50,23 +50,25 @@ def one_revolution(
     for k in range(cells * scheme.steps_per_cell):
         cell = k // scheme.steps_per_cell
         if k % scheme.steps_per_cell == 0:
-            fresh = motion.worn[:, cell].copy() if restarts else np.zeros(len(motion.force))
+            fresh = motion.worn[:, cell].copy() if restarts else np.zeros(len(gap))
         if k % every == 0:
             samples.force[k // every] = motion.impulse / every
             motion.impulse[:] = 0.0
-        free = scheme.carry * motion.now - scheme.drag * motion.before
+        held = tip.contact @ motion.force[1] + tip.tangential @ motion.sliding[1]
+        free = scheme.carry * motion.now - scheme.drag * motion.before - scheme.push * held / 2
         slip = tip.rim_speed + (motion.now - motion.before) @ tip.tangential / h
         slides = np.where(slip >= 0, 1.0, -1.0)
         give = tip.compliance + slides * tip.sideways
         shortening = free @ tip.contact - gap[:, cell]
         worn = motion.worn[:, cell]
-        force, yields, rounds = _corrected(shortening, give, worn, fresh, bars, motion.force)
+        force, yields, rounds = _corrected(shortening, give, worn, fresh, bars, motion.force[0])
         if rounds > MOST_ROUNDS:
             return NOT_CONVERGED, 0, cell, rounds
         most_rounds = max(most_rounds, rounds)
-        inward = tip.contact @ force
-        against = tip.friction * (tip.tangential @ (slides * force))
-        after = free - scheme.push * (inward + against)
+        sliding = tip.friction * slides * force
+        after = free - scheme.push * (tip.contact @ force + tip.tangential @ sliding) / 2
+        inward = tip.contact @ (force + motion.force[1]) / 2
+        against = tip.tangential @ (sliding + motion.sliding[1]) / 2
         moved = after - motion.before
         motion.work[0] -= (scheme.loss * moved**2).sum() / (4 * h)
         motion.work[1] -= inward @ moved / 2
@@ -74,7 +76,9 @@ def one_revolution(
         if k % every == 0:
             samples.position[k // every] = motion.now
             samples.velocity[k // every] = moved / (2 * h)
-        motion.before[:], motion.now[:], motion.force[:] = motion.now, after, force
+        motion.before[:], motion.now[:] = motion.now, after
+        motion.force[:] = force, motion.force[0].copy()
+        motion.sliding[:] = sliding, motion.sliding[0].copy()
         motion.impulse[:] += force
         reached = after @ tip.contact - gap[:, cell] - force / bars.elastic
         motion.worn[:, cell] = np.where(yields, np.maximum(worn, reached), worn)

@@ -272,7 +272,8 @@ def _start(modes: TipModes, scheme: Scheme, initial: InitialMotion | None, cells
         now,
         before,
         np.zeros((nodes, cells)),
-        np.zeros(nodes),
+        np.zeros((2, nodes)),
+        np.zeros((2, nodes)),
         np.zeros(nodes),
         np.zeros(3),
         np.abs(now @ modes.observed),
@@ -282,7 +283,7 @@ def _start(modes: TipModes, scheme: Scheme, initial: InitialMotion | None, cells
 def _tip(rub: LinerRub, modes: TipModes, scheme: Scheme, speed_hz: float) -> Tip:
     mu = 0.0 if rub.friction is None else rub.friction.coefficient
     turn = 1 if rub.friction is None else rub.friction.rotation
-    pushed = modes.contact.T * scheme.push
+    pushed = modes.contact.T * scheme.push / 2
     return Tip(
         modes.observed,
         modes.contact,

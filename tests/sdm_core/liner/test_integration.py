@@ -124,7 +124,7 @@ def test_energy_of_the_scheme_is_kinetic_and_strain_energy_to_second_order():
     assert wrong[0] / wrong[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_motion_with_contact_converges_with_the_step_at_first_order():
+def test_where_the_force_jumps_the_motion_converges_with_the_step_at_first_order():
     rub = rotor_37(yield_force_n=0.0, elastic_recovery=0.3)
 
     def displacement(steps: int) -> np.ndarray:
