@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TypeVar
@@ -208,7 +208,7 @@ def speeds_as_they_come(
     initial: InitialMotion | None = None,
     extrapolate: bool = False,
     workers: int | None = None,
-) -> Iterator[tuple[int, SpeedResult]]:
+) -> Generator[tuple[int, SpeedResult], None, None]:
     """(index of the speed, result), in any order.
 
     In threads: the compiled revolutions do not hold Python's lock, and nothing has to be sent about. A liner
@@ -252,7 +252,7 @@ def speeds_as_they_come(
 
 def in_threads(
     work: Callable[[float], Result], parts: Sequence[float], workers: int
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     """(index, result) of each part as they come; for work that leaves Python's lock alone.
 
     When the caller gives up or a part fails, parts not begun are dropped, and those begun stop at their next
