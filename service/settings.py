@@ -52,7 +52,8 @@ class Settings(BaseSettings):
     run_jobs
         Whether this process runs jobs; without, it takes them for others that share the database.
     jobs_at_once
-        Screenings this process runs at the same time; they share its workers by priority.
+        Screenings, and as many simulations, this process runs at the same time; they share its workers by
+        priority.
     job_lease_s
         Time after which the jobs of a replica that says nothing any more are taken over, s.
     engine_workers

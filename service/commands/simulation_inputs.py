@@ -8,14 +8,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from sdm_core.blade import Blade
-from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.time_domain.liner.abradable_liner import Friction
 from service.commands.inputs import contact_from, speed_count
 from service.commands.serve import settings_from
 from service.simulation.constants import CasingConstants, LinerConstants
+from service.simulation.limits import check_reachable
 from service.simulation.order import SimulationOrder
-from service.sizes import check_reach
 from service.speeds import Speed, SpeedRange, evenly_spaced
 
 _OPTIONS = {
@@ -38,6 +37,7 @@ _OPTIONS = {
     "cells": "--cells",
     "steps_per_cell": "--cells",
     "revolutions": "--revolutions",
+    "speed_hz": "--speed",
 }
 
 
@@ -96,11 +96,9 @@ def order_from(
         Naming the option, its value and the remedy.
     """
     contact = contact_from(nodes, None, None, None, blade)
-    speeds_hz = _speeds(speed, count, blade)
-    _check_reach(blade, contact, speeds_hz, speed)
     order = SimulationOrder(
         blade,
-        tuple(speeds_hz.tolist()),
+        tuple(_speeds(speed, count, blade).tolist()),
         tuple(contact.weights),
         revolutions,
         liner,
@@ -108,12 +106,7 @@ def order_from(
         None if friction is None else Friction(friction),
         cells,
     )
-    most = settings_from(None).max_simulation_values
-    if order.kept_values > most:
-        remedy = (
-            f"one speed would keep {order.kept_values:,} numbers, at most {most:,}: give fewer, or raise "
-        )
-        raise InvalidInput("revolutions", revolutions, remedy + "RUBSCREEN_MAX_SIMULATION_VALUES")
+    check_reachable(order, settings_from(None))
     return order
 
 
@@ -130,16 +123,8 @@ def _speeds(text: str | None, count: int | None, blade: Blade) -> np.ndarray:
         if blade.design_speed_hz is None:
             raise InvalidInput("--speed", "left out", "give one: the blade file has no design speed")
         return np.array([blade.design_speed_hz])
-    return np.array([Speed.parse(text, "--speed").in_hz(blade.first_frequency_hz)])
-
-
-def _check_reach(
-    blade: Blade, contact: ContactConfiguration, speeds_hz: np.ndarray, typed: str | None
-) -> None:
-    try:
-        check_reach(blade, contact, speeds_hz, "--ke-liner", 0.0, settings_from(None))
-    except InvalidInput as error:
-        if not error.field.startswith("speed"):
-            raise
-        kind = OutOfSpeedRange if isinstance(error, OutOfSpeedRange) else InvalidInput
-        raise kind("--speed", typed or error.value, error.remedy) from None
+    speed, reach = Speed.parse(text, "--speed").in_hz(blade.first_frequency_hz), blade.speed_range_hz
+    if reach is not None and not reach[0] <= speed <= reach[1]:
+        remedy = f"blade {blade.name!r} has modal data from {reach[0]:g} to {reach[1]:g} Hz"
+        raise OutOfSpeedRange("--speed", text, f"{remedy}: stay inside or add a state")
+    return np.array([speed])

@@ -121,8 +121,9 @@ def simulated(
     parts: list[SimulatedSpeeds] = []
     response: Response | None = None
     with closing(each_speed(order, workers, progress)) as found:
-        for part, response in found:
+        for part, its_response in found:
             parts.append(part)
+            response = its_response
     return SimulationOutcome(order, SimulatedSpeeds.joined(parts), response, unstable_lobes(order))
 
 
