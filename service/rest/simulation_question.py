@@ -249,8 +249,8 @@ class SimulationQuestion(BaseModel):
             self.cells,
             self.steps_per_cell,
         )
-        check_reachable(self._order, settings)
         check_size(self._order, settings)
+        check_reachable(self._order, settings)
         return self
 
 

@@ -33,13 +33,12 @@ class SimulationReply(BaseModel):
     revolutions: int
     ke: float = Field(description="K_e of each contact node, N/m.")
     critical_ke_factor: float = Field(
-        description="The liner's critical K_e over that of the delay equation; the exact verdicts allow for it."
+        description="The liner's critical K_e over that of the delay equation; exact verdicts allow for it."
     )
     cells: int
     speed_hz: list[float]
     wear_lobes: list[list[int]] = Field(
-        description="By speed and contact node: strongest harmonic of the worn profile, the ovalisation's left "
-        "aside."
+        description="By speed and contact node: strongest harmonic of the worn profile but the ovalisation's."
     )
     lobe_amplitude_m: Rows
     deepest_m: Rows = Field(description="Deepest wear by speed and contact node.")
