@@ -1,4 +1,4 @@
-"""Simulations over REST with the real engine: ordered, followed, fetched, drawn; refused where they must be."""
+"""Simulations over REST with the real engine: ordered, followed, fetched, drawn, and refused."""
 
 from __future__ import annotations
 
