@@ -9,7 +9,7 @@ OUT ?= out/demo
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve train test lint bench clean
+.PHONY: help demo serve train test lint docs bench clean
 
 help: ## show this
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -30,6 +30,10 @@ lint: $(VENV)/.installed-dev ## check style, formatting and types
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+
+docs: $(VENV)/.installed-docs ## write the documentation site to out/docs, warnings are errors
+	@OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -q -W --keep-going -b html -d out/doctrees docs out/docs $(ARGS)
+	@echo "open out/docs/index.html"
 
 bench: $(VENV)/.installed-bench ## measure against peers (ARGS="accuracy speed" for the other measurements)
 	@$(BIN)/python -m benchmarks $(ARGS)
@@ -61,6 +65,11 @@ $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	@echo "installing rubscreen and what its development needs"
 	@$(PIP_INSTALL) --editable '.[dev]'
 	@touch $(VENV)/.installed $(VENV)/.installed-test $@
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	@echo "installing rubscreen and what its documentation needs"
+	@$(PIP_INSTALL) --editable '.[docs]'
+	@touch $(VENV)/.installed $@
 
 $(VENV)/.installed-bench: pyproject.toml | $(BIN)/python
 	@echo "installing rubscreen and the peers it is measured against"

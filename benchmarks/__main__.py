@@ -26,6 +26,7 @@ MEASUREMENTS = {
     "speed": "benchmarks.map_speed",
     "audit": "benchmarks.audit",
     "extensions": "benchmarks.model_extensions",
+    "witness": "benchmarks.time_witness",
     "liner": "benchmarks.time_domain_liner",
 }
 

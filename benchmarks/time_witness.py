@@ -1,4 +1,4 @@
-"""``python -m benchmarks.time_witness``: random points, the exact core against integration in time.
+"""`make bench ARGS=witness`: random points, the exact core against integration in time.
 
 Half in permanent contact, half with arcs, each at least 1 % in K_e off the boundary. The two share no
 discretization: `sdm_core.time_domain` integrates the equation of motion and knows no characteristic equation.
@@ -6,14 +6,13 @@ discretization: `sdm_core.time_domain` integrates the equation of motion and kno
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, Group
 from rich.progress import track
 from rich.table import Table
 from threadpoolctl import threadpool_limits
@@ -24,6 +23,7 @@ from sdm_core.stability import stability
 from sdm_core.time_domain.witness import time_witness
 
 POINTS, SEED, OFF = 200, 7, 0.01
+KEPT = Path("out/bench/time_witness.json")
 
 
 @dataclass(frozen=True)
@@ -87,24 +87,16 @@ def compared(problem: RubbingBlade) -> Compared:
     )
 
 
-def main() -> None:
-    """Measure, and say so."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--points", type=int, default=POINTS)
-    parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--out", type=Path, default=Path("out/bench/time_witness.json"))
-    asked = parser.parse_args()
-    console = Console()
+def table(count: int = POINTS, seed: int = SEED) -> Group:
+    """What `make bench ARGS=witness` prints; every point goes to out/bench/time_witness.json."""
     with threadpool_limits(1):
-        drawn = points(asked.points, asked.seed)
+        drawn = points(count, seed)
         time_witness(drawn[0])  # compiled before the clock runs
         found = [compared(problem) for problem in track(drawn, "integrating")]
-    table = Table(
-        "contact", "points", "stable", "same verdict", "|μ| differs by", "chatter by", "pairs named"
-    )
+    out = Table("contact", "points", "stable", "same verdict", "|μ| differs by", "chatter by", "pairs named")
     for contact in ("permanent", "arcs"):
         of = [c for c in found if c.contact == contact]
-        table.add_row(
+        out.add_row(
             contact,
             str(len(of)),
             str(sum(c.stable is True for c in of)),
@@ -113,15 +105,15 @@ def main() -> None:
             f"{max(c.chatter_difference for c in of):.1e}",
             str(sum(c.nearly_equal > 0 for c in of)),
         )
-    console.print(table)
+    KEPT.parent.mkdir(parents=True, exist_ok=True)
+    KEPT.write_text(json.dumps([asdict(c) for c in found], indent=1))
     exact, witness = (np.array([getattr(c, f"{who}_s") for c in found]) for who in ("exact", "witness"))
-    console.print(
+    return Group(
+        out,
         f"a point: exact core {np.median(exact) * 1e3:.1f} ms (largest {exact.max():.2f} s), "
-        f"integration {np.median(witness) * 1e3:.0f} ms (largest {witness.max():.1f} s)"
+        f"integration {np.median(witness) * 1e3:.0f} ms (largest {witness.max():.1f} s)",
     )
-    asked.out.parent.mkdir(parents=True, exist_ok=True)
-    asked.out.write_text(json.dumps([asdict(c) for c in found], indent=1))
 
 
 if __name__ == "__main__":
-    main()
+    Console().print(table())

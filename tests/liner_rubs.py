@@ -7,7 +7,7 @@ import numpy as np
 from sdm_core.blade import Blade, ModalState, example_blade
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner, Friction
 from sdm_core.time_domain.liner.casing import Casing
-from sdm_core.time_domain.liner.simulation import LinerRub
+from sdm_core.time_domain.liner.liner_rub import LinerRub
 
 FREQUENCY_HZ, DAMPING, AMPLITUDE = 100.0, 0.01, 3.0
 FLOOR_KE = 2 * DAMPING * (1 + DAMPING) * (2 * np.pi * FREQUENCY_HZ) ** 2 / AMPLITUDE**2

@@ -1,7 +1,7 @@
 """Docstrings as they are meant: plain text with equations, not reStructuredText.
 
-The code writes |μ|, K_e* and indented equations as one reads them. Here they are made safe for the parser: bars and
-asterisks are escaped, an indented equation becomes a literal block.
+The code writes |μ|, K_e* and indented equations as one reads them. Here they are made safe for the parser:
+bars and asterisks are escaped, an indented equation becomes a literal block.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 _CODE = re.compile(r"(``.*?``|`[^`]*`(?:_\b)?)")
@@ -52,6 +53,14 @@ def _process(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: l
     lines[:] = plain(lines)
 
 
+def _dashes(app: Sphinx, doctree: nodes.document) -> None:
+    """A dash between a parameter and what is said of it; quotes and hyphens elsewhere stay as written."""
+    for text in doctree.findall(nodes.Text):
+        if text.astext() == " -- ":
+            text.parent.replace(text, nodes.Text(" – "))
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", _process, priority=400)  # before napoleon, at 500
+    app.connect("doctree-read", _dashes)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -15,7 +15,7 @@ _CONVERTER = LatexToMathML()
 
 
 def _mathml(node: nodes.Element, block: bool) -> str:
-    """MathML of a formula; one that cannot be read is a warning, which fails the build, and stays as it is."""
+    """MathML of a formula; one that cannot be read is a warning, which fails the build, and stays."""
     formula = node.astext()
     try:
         return _CONVERTER.convert_with_local_state(formula, displaystyle=block)

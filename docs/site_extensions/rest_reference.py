@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,10 @@ def reference(document: dict[str, Any]) -> str:
 
 def _contents(document: dict[str, Any]) -> str:
     rows = [
-        (f"[`{method.upper()} {path}`](#{_anchor(method, path)})", operation.get("description", "").split("\n")[0])
+        (
+            f"[`{method.upper()} {path}`](#{_anchor(method, path)})",
+            operation.get("description", "").split("\n")[0],
+        )
         for path, methods in document["paths"].items()
         for method, operation in methods.items()
     ]
@@ -77,7 +81,13 @@ def _anchor(method: str, path: str) -> str:
 def _call(method: str, path: str, operation: dict[str, Any], shared: dict[str, str]) -> str:
     out = [f"({_anchor(method, path)})=\n### `{method} {path}`\n", operation.get("description", ""), ""]
     parameters = [
-        (f"`{p['name']}`", p["in"], _type(p["schema"]), "yes" if p.get("required") else "", _said(p, p["schema"]))
+        (
+            f"`{p['name']}`",
+            p["in"],
+            _type(p["schema"]),
+            "yes" if p.get("required") else "",
+            _said(p, p["schema"]),
+        )
         for p in operation.get("parameters", ())
     ]
     if parameters:
@@ -103,7 +113,7 @@ def _forms(content: dict[str, Any]) -> str:
 
 def _form(part: dict[str, Any]) -> str:
     schema = part.get("schema", {})
-    return f"{_type(schema)}. {schema.get('description', '')}".rstrip(". ") or "any"
+    return ". ".join(said for said in (_type(schema), schema.get("description", "")) if said) or "any"
 
 
 def _forms_in_a_cell(content: dict[str, Any]) -> str:
@@ -120,7 +130,7 @@ def _example(content: dict[str, Any]) -> list[str]:
     return [f"```json\n{_folded(example)}\n```\n"]
 
 
-def _folded(value: Any, indent: int = 0, width: int = 100) -> str:
+def _folded(value: Any, indent: int = 0, width: int = 88) -> str:
     """JSON with short lists and objects on one line."""
     flat = json.dumps(value, ensure_ascii=False)
     if len(flat) + indent <= width or not isinstance(value, dict | list):
@@ -136,7 +146,7 @@ def _folded(value: Any, indent: int = 0, width: int = 100) -> str:
 
 
 def _schema(name: str, schema: dict[str, Any]) -> str:
-    out = [f"(schema-{name})=\n### {name}\n", schema.get("description", ""), ""]
+    out = [f"(schema-{name})=\n### {name}\n", _before_sections(schema.get("description", "")), ""]
     if "properties" in schema:
         required = set(schema.get("required", ()))
         rows = [
@@ -147,6 +157,11 @@ def _schema(name: str, schema: dict[str, Any]) -> str:
     else:
         out.append(_type(schema) + "\n")
     return "\n".join(out)
+
+
+def _before_sections(text: str) -> str:
+    """A docstring up to its parameters, which the table of fields has."""
+    return re.split(r"\n[A-Z]\w+\n---", text)[0]
 
 
 def _type(schema: dict[str, Any]) -> str:

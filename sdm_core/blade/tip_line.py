@@ -158,8 +158,8 @@ def cylindrical_frames(position_m: np.ndarray, rotation_axis: np.ndarray) -> np.
 
     Returns
     -------
-    Shape (r, 3, 3): [point, (radial, tangential, axial), xyz]; tangential = axial × radial, the
-    direction of rotation.
+    Shape (r, 3, 3): [point, (radial, tangential, axial), xyz]; tangential = axial × radial, which is the
+    direction of rotation for one half of all rotors and against it for the other.
 
     Raises
     ------

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sdm_core.time_domain.compiled import compiled
 from sdm_core.time_domain.runge_kutta import ALL_STAGES, DENSE, ERROR_3, ERROR_5, STAGES, TABLE, TERMS
 
 _LAST_SLOPE = STAGES  # taken at the end of the step
 
 
-@njit(cache=True)
+@compiled
 def one_revolution(
     steps: np.ndarray,
     start: np.ndarray,

@@ -143,7 +143,7 @@ class ScreeningResults:
         """Blades that could not be, in the order of the request."""
         from service.jobs.screening.results import unscreened_of
 
-        return tuple(NotScreened(**vars(blade)) for blade in unscreened_of(self.table))
+        return tuple(NotScreened(**vars(blade)) for blade in unscreened_of(self.table.schema))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, rows as the service writes them."""

@@ -20,8 +20,11 @@ def run(
             show_default=False,
         ),
     ] = None,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="Write index.md, as in docs/paper, instead of index.html.")
+    ] = False,
 ) -> None:
-    """Draw Figs. 5 to 10 and 13 of Salvat et al. for two real blades, and say what agrees.
+    """Draw Figs. 5 to 14 of Salvat et al. for two real blades, and say what agrees.
 
     Example: rubscreen paper --out out/paper, then open out/paper/index.html
     """
@@ -32,10 +35,12 @@ def run(
     from service.commands.outputs import check_writable, progress_bar, terminal, write_bytes, write_json
     from service.paper_figures.all_figures import all_figures, example_studies
     from service.paper_figures.drawing import figure_png
+    from service.paper_figures.markdown_page import markdown_page
     from service.paper_figures.page import paper_page
     from service.screening.report_files import file_name
 
-    check_writable(out=f"{out}/index.html")
+    page = f"{out}/index.{'md' if markdown else 'html'}"
+    check_writable(out=page)
     studies = example_studies(direction)
     made, began = datetime.now(UTC), time.perf_counter()
     with progress_bar("paper") as progress:
@@ -61,8 +66,14 @@ def run(
         "figures": figures,
     }
     write_json(f"{out}/figures.json", document)
-    write_bytes("--out", f"{out}/index.html", paper_page(blades, pictures, made).encode())
-    console.print(
-        f"wrote {len(figures)} figures, figures.json and {out}/index.html "
-        f"in {time.perf_counter() - began:.0f} s"
-    )
+    if markdown:
+        files = [
+            [str(figure["picture"]) for figure in figures if figure["blade"] == b.study.blade.name]
+            for b in blades
+        ]
+        text = markdown_page(blades, files, f"rubscreen paper --markdown --out {out}")
+    else:
+        text = paper_page(blades, pictures, made)
+    write_bytes("--out", page, text.encode())
+    spent = time.perf_counter() - began
+    console.print(f"wrote {len(figures)} figures, figures.json and {page} in {spent:.0f} s")

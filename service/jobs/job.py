@@ -10,6 +10,7 @@ from typing import Any
 
 SCREENING, TRAINING, SIMULATION = "screening", "training", "simulation"
 KINDS = (SCREENING, TRAINING, SIMULATION)
+LONGEST_NAME = 200  # characters
 # 1 is first.
 FIRST_PRIORITY, USUAL_PRIORITY, LAST_PRIORITY = 1, 5, 9
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from sdm_core.blade import EXAMPLES, example_blade
 from sdm_core.errors import InvalidInput
 from sdm_core.lobe_tips import least_critical_ke
+from service.paper_figures import rubbing
 from service.paper_figures.bending_and_torsion import bending_and_torsion
 from service.paper_figures.centrifugal_stiffening import centrifugal_stiffening
 from service.paper_figures.contact_location import contact_location
 from service.paper_figures.modal_convergence import modal_convergence
 from service.paper_figures.paper_figure import PaperFigure, newtons
+from service.paper_figures.response_spectrum import response_spectrum
 from service.paper_figures.responses import responses
+from service.paper_figures.rubbing import Rubs
 from service.paper_figures.stability_diagram import stability_diagram
 from service.paper_figures.study import Study, study_of
 from service.paper_figures.time_convergence import time_convergence, time_convergence_parts
+from service.paper_figures.wear_maps import wear_maps
 
 Progress = Callable[[int, int, str], None]
 
@@ -60,7 +65,7 @@ def all_figures(studies: list[Study], progress: Progress = lambda *_: None) -> I
     """Figures of one blade after the other; `progress` hears (done, total, what is next)."""
     quick = (stability_diagram, responses, modal_convergence, centrifugal_stiffening, contact_location)
     parts = [time_convergence_parts(study) for study in studies]
-    total = sum(parts) + len(studies) * (len(quick) + 1)
+    total = sum(parts) + len(studies) * (len(quick) + 1 + 3 * rubbing.SPEEDS)
     count = 0
     for study in studies:
         name = study.blade.name
@@ -70,11 +75,13 @@ def all_figures(studies: list[Study], progress: Progress = lambda *_: None) -> I
             count += 1
             progress(count, total, f"{name}, {what}")
 
-        figures = []
+        figures: list[PaperFigure] = []
         for draw in (*quick, bending_and_torsion):
             figures.append(draw(study))
             done(f"Fig. {figures[-1].number}")
         figures.append(time_convergence(study, done))
+        rubs = Rubs(study, partial(done, "Figs. 11, 12 and 14"))
+        figures += [*wear_maps(study, rubs), response_spectrum(study, rubs)]
         yield BladeFigures(study, about(study), tuple(sorted(figures, key=lambda figure: figure.number)))
 
 

@@ -25,10 +25,9 @@ from sqlalchemy import (
 from sqlalchemy.exc import IntegrityError
 
 from service.jobs.errors import NoSuchJob, OtherRequest, UnderWay
-from service.jobs.job import ACTIVE, FINISHED, Fault, Job, State
+from service.jobs.job import ACTIVE, FINISHED, LONGEST_NAME, Fault, Job, State
 from service.records.database import METADATA, Database
 
-LONGEST_NAME = 200
 JOBS = Table(
     "rubscreen_jobs",
     METADATA,

@@ -23,7 +23,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from service.field_values import nearest, remedy_for
-from service.records.jobs import LONGEST_NAME
+from service.jobs.job import LONGEST_NAME
 from service.rest.known_blades import KnownBlades
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
 from service.settings import Settings
@@ -199,7 +199,7 @@ class MapQuestion(KeQuestion):
                 raise InvalidInput(field, values.tolist(), remedy)
 
 
-def check_job_name(name: str | None, settings: Settings) -> None:
+def check_job_name(name: str | None, most: int = LONGEST_NAME) -> None:
     """Refuse what no database holds as the name of a job, or no list shows.
 
     Raises
@@ -208,7 +208,7 @@ def check_job_name(name: str | None, settings: Settings) -> None:
     """
     if name is None:
         return
-    check_length("name", name, min(settings.max_name_length, LONGEST_NAME), "shorten it")
+    check_length("name", name, min(most, LONGEST_NAME), "shorten it")
     if any(unicodedata.category(character) in ("Cc", "Cs") for character in name):
         raise InvalidInput("name", name, "leave out control characters")
 

@@ -260,7 +260,7 @@ class ScreeningQuestion(BaseModel):
             raise InvalidInput("ke_liner", self.ke_liner, f"give at most ke_max, {self.ke_max:g} N/m")
         if self.criteria.least_margin is not None and self.ke_liner is None:
             raise InvalidInput("criteria.least_margin", self.criteria.least_margin, "give ke_liner too")
-        check_job_name(self.name, settings_of(info))
+        check_job_name(self.name, settings_of(info).max_name_length)
         return self
 
     def documents(self, uploads: Uploads, owner: str | None, settings: Settings) -> Iterator[tuple[str, Any]]:

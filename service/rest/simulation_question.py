@@ -237,7 +237,7 @@ class SimulationQuestion(BaseModel):
     @model_validator(mode="after")
     def _that_can_be_simulated(self, info: ValidationInfo) -> Self:
         settings = settings_of(info)
-        check_job_name(self.name, settings)
+        check_job_name(self.name, settings.max_name_length)
         self._order = SimulationOrder(
             self.blade,
             self.speed_hz,

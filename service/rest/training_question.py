@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from service.jobs.training.request import TrainingRequest
-from service.rest.questions import check_job_name, read_question, settings_of
+from service.rest.questions import check_job_name, read_question
 from service.settings import Settings
 
 Json = dict[str, Any]
@@ -40,8 +40,8 @@ class TrainingQuestion(BaseModel):
     promote: bool = Field(True, description="Make the model active, unless the gate refuses it.")
 
     @model_validator(mode="after")
-    def _of_a_name_that_can_be_kept(self, info: ValidationInfo) -> Self:
-        check_job_name(self.name, settings_of(info))
+    def _of_a_name_that_can_be_kept(self) -> Self:
+        check_job_name(self.name)
         return self
 
     @classmethod

@@ -14,7 +14,7 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import InvalidInput
 from sdm_core.time_domain.liner.abradable_liner import Friction
 from sdm_core.time_domain.liner.central_differences import LEAST_STEPS_PER_CELL, CentralDifferences
-from sdm_core.time_domain.liner.simulation import LinerRub
+from sdm_core.time_domain.liner.liner_rub import LinerRub
 from sdm_core.time_domain.liner.speed_sweep import SPECTRUM_REVOLUTIONS
 from sdm_core.validation import number, speeds
 from service.simulation.constants import CasingConstants, LinerConstants

@@ -12,7 +12,7 @@ from sdm_core.blade import Blade, ModalState, example_blade
 from sdm_core.contact import ContactConfiguration
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged
-from service.paper_figures import fixed_steps, study, time_convergence
+from service.paper_figures import fixed_steps, rubbing, study, time_convergence
 from service.paper_figures.bending_and_torsion import bending_and_torsion
 from service.paper_figures.centrifugal_stiffening import centrifugal_stiffening
 from service.paper_figures.contact_location import contact_location, flexibility
@@ -25,6 +25,7 @@ from service.paper_figures.responses import responses
 from service.paper_figures.stability_diagram import stability_diagram
 from service.paper_figures.study import Study, at_rest, ke_axis, least_ke_of_modes, study_of, with_modes
 from service.paper_figures.time_convergence import lobe_errors
+from service.paper_figures.wear_maps import main_lobes
 
 LE = ContactConfiguration.at("LE")
 
@@ -260,6 +261,8 @@ def test_the_shipped_blades_begin_with_bending_and_torsion():
 def test_the_command_writes_every_figure_a_page_and_the_numbers(rubscreen, narrow, monkeypatch, tmp_path):
     monkeypatch.setattr(study, "LOWEST_RATIO", 0.30)
     monkeypatch.setattr(time_convergence, "_EVEN_SPEEDS", 10)
+    monkeypatch.setattr(rubbing, "SPEEDS", 3)
+    monkeypatch.setattr(rubbing, "REVOLUTIONS", 20)
     out = tmp_path / "paper"
     result = rubscreen("paper", "--out", str(out))
     assert result.exit_code == 0, result.output
@@ -269,15 +272,37 @@ def test_the_command_writes_every_figure_a_page_and_the_numbers(rubscreen, narro
     assert drawn == [
         (blade, number)
         for blade in ("nasa-rotor-37", "generic-compressor-blade")
-        for number in (5, 6, 7, 8, 9, 10, 13)
+        for number in (5, 6, 7, 8, 9, 10, 11, 12, 13, 14)
     ]
     page = (out / "index.html").read_text()
-    assert page.count("data:image/png;base64,") == 14
+    assert page.count("data:image/png;base64,") == 20
     assert not re.search(r"<script|https?://|src=\"(?!data:)", page)
     for figure in document["figures"]:
         assert (out / figure["picture"]).read_bytes().startswith(b"\x89PNG")
         for line in ("agrees", "differs"):
             assert figure[line].replace("K_e", "K<sub>e</sub>").replace("'", "&#x27;") in page
+
+
+def test_the_documentation_page_names_every_picture_and_every_verdict(
+    rubscreen, narrow, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(study, "LOWEST_RATIO", 0.30)
+    monkeypatch.setattr(time_convergence, "_EVEN_SPEEDS", 10)
+    monkeypatch.setattr(rubbing, "SPEEDS", 3)
+    monkeypatch.setattr(rubbing, "REVOLUTIONS", 20)
+    assert rubscreen("paper", "--markdown", "--out", str(tmp_path)).exit_code == 0
+    page = (tmp_path / "index.md").read_text()
+    document = json.loads((tmp_path / "figures.json").read_text())
+    assert sorted(re.findall(r"!\[.*\]\((.*)\)", page)) == sorted(f["picture"] for f in document["figures"])
+    for figure in document["figures"]:
+        for one in figure["claims"]:
+            assert f"**{one['verdict'].capitalize()}**" in page
+
+
+def test_the_main_lobes_of_a_profile_are_its_strongest_harmonic():
+    angle = 2 * np.pi * np.arange(500) / 500
+    grooves = np.maximum(0.0, np.cos(2 * angle) - 0.5)
+    assert main_lobes(np.array([grooves, grooves + 0.4 * np.cos(7 * angle)])).tolist() == [2, 7]
 
 
 def test_radial_amplitudes_are_drawn_on_request_and_others_refused(rubscreen, narrow, tmp_path):

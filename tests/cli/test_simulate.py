@@ -15,7 +15,8 @@ from sdm_core.blade import blade_to_dict, example_blade
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
-from sdm_core.time_domain.liner.simulation import LinerRub, simulate_rub
+from sdm_core.time_domain.liner.liner_rub import LinerRub
+from sdm_core.time_domain.liner.simulation import simulate_rub
 from service import cli
 from service.commands import outputs
 from service.simulation.constants import LinerConstants

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sdm_core.time_domain.compiled import compiled
 from sdm_core.time_domain.liner.abradable_liner import Bars
 from sdm_core.time_domain.liner.central_differences import Scheme
 
@@ -90,7 +90,7 @@ class Samples(NamedTuple):
     force: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bar_force(
     shortening: float,
     compliance: float,
@@ -116,7 +116,7 @@ def bar_force(
     return force, True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def one_revolution(
     motion: Motion,
     gap: np.ndarray,

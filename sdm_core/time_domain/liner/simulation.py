@@ -4,115 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from sdm_core.blade import Blade
 from sdm_core.errors import InvalidInput, LinerWornThrough, NotConverged
 from sdm_core.interruption import checkpoint
 from sdm_core.time_domain.liner import liner_kernel
-from sdm_core.time_domain.liner.abradable_liner import AbradableLiner, Bars, Friction
-from sdm_core.time_domain.liner.casing import Casing
+from sdm_core.time_domain.liner.abradable_liner import Bars
 from sdm_core.time_domain.liner.central_differences import CentralDifferences, Scheme
 from sdm_core.time_domain.liner.energy import EnergyAccount, scheme_energy
 from sdm_core.time_domain.liner.liner_kernel import Motion, Samples, Tip
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
 from sdm_core.time_domain.liner.rub_history import RubHistory
 from sdm_core.time_domain.liner.tip_modes import TipModes
-from sdm_core.validation import SPEED_LIMITS_HZ, number, vector
+from sdm_core.validation import number
 
 MOST_REVOLUTIONS = 1_000_000
 
 Progress = Callable[[int, int], None]
 Kernel = Callable[[Motion, np.ndarray, Tip, Bars, bool, Scheme, Samples], tuple[int, int, int, int]]
-
-
-@dataclass(frozen=True)
-class LinerRub:
-    """The problem: a blade whose tip may touch an abradable liner.
-
-        ẍ + 2ξΛẋ + Λ²x = −V_c F − V_t F_t,    u = V_cᵀx,
-
-    with the forces F ≥ 0 of the liner's bars on the contact nodes, which push the tip inwards, and friction
-    F_t = ±μF against the direction in which the tip slides.
-
-    Parameters
-    ----------
-    blade
-        Modal data; its direction of contact is the one that counts.
-    nodes
-        Names of the tip nodes that can touch.
-    liner, casing
-        What they touch.
-    friction
-        None leaves it out.
-
-    Raises
-    ------
-    InvalidInput
-        For a node the blade has not got, and for clearances or widths of another number than nodes.
-    """
-
-    blade: Blade
-    nodes: tuple[str, ...]
-    liner: AbradableLiner
-    casing: Casing
-    friction: Friction | None = None
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.blade, Blade):
-            raise InvalidInput("blade", type(self.blade).__name__, "give a Blade, e.g. read_blade(path)")
-        if not isinstance(self.nodes, list | tuple) or len(self.nodes) == 0:
-            raise InvalidInput("nodes", self.nodes, "name at least one tip node that can touch")
-        object.__setattr__(self, "nodes", tuple(self.nodes))
-        for i, node in enumerate(self.nodes):
-            if node not in self.blade.tip_nodes or node in self.nodes[:i]:
-                known = ", ".join(self.blade.tip_nodes)
-                raise InvalidInput(f"nodes[{i}]", node, f"name each tip node once, of {known}")
-        self.casing.clearances(len(self.nodes))
-        self.liner.widths(len(self.nodes))
-        if self.friction is not None and any(s.mode_shape_tangential is None for s in self.blade.states):
-            TipModes.of_blade(self.blade, self.nodes, self.blade.states[0].speed_hz, tangential=True)
-
-    def modes(self, speed_hz: float, *, extrapolate: bool = False) -> TipModes:
-        """The blade's modal data at a rotor speed."""
-        number("speed_hz", speed_hz, *SPEED_LIMITS_HZ, "Hz")
-        return TipModes.of_blade(
-            self.blade,
-            self.nodes,
-            speed_hz,
-            tangential=self.friction is not None,
-            extrapolate=extrapolate,
-        )
-
-    def bars(self, cells: int) -> Bars:
-        """The bars under the contact nodes."""
-        return self.liner.bars(len(self.nodes), 2 * np.pi * self.casing.radius_m / cells)
-
-    def cutting_stiffness(self, cells: int) -> np.ndarray:
-        """K_e of each contact node, N/m, shape (r,)."""
-        return self.liner.cutting_stiffness(self.bars(cells))
-
-
-@dataclass(frozen=True)
-class InitialMotion:
-    """Modal displacement (kg^½ m) and velocity (kg^½ m/s) at t = 0, each of shape (n,)."""
-
-    displacement: np.ndarray
-    velocity: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def checked(self, modes: int) -> tuple[np.ndarray, np.ndarray]:
-        """Both, of `modes` numbers; an empty velocity is zero."""
-        put = vector("initial.displacement", self.displacement, -1e6, 1e6, "kg^1/2 m")
-        moving: Any = self.velocity if len(self.velocity) else np.zeros(modes)
-        pushed = vector("initial.velocity", moving, -1e9, 1e9, "kg^1/2 m/s")
-        for name, values in (("displacement", put), ("velocity", pushed)):
-            if len(values) != modes:
-                raise InvalidInput(
-                    f"initial.{name}", f"{len(values)} numbers", f"give one number a mode: {modes}"
-                )
-        return put, pushed
 
 
 def simulate_rub(
@@ -152,6 +62,8 @@ def simulate_rub(
     Examples
     --------
     >>> from sdm_core.blade import example_blade
+    >>> from sdm_core.time_domain.liner.abradable_liner import AbradableLiner
+    >>> from sdm_core.time_domain.liner.casing import Casing
     >>> rub = LinerRub(
     ...     example_blade("nasa_rotor_37"),
     ...     ("LE",),

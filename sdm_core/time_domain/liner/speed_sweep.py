@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
-from sdm_core.errors import Cancelled, InvalidInput
-from sdm_core.interruption import checkpoint, interruptible
+from sdm_core.errors import InvalidInput
 from sdm_core.parallel import available_cores, checked_workers
+from sdm_core.time_domain.in_threads import in_threads
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
 from sdm_core.time_domain.liner.rub_history import RubHistory
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, run_revolutions
+from sdm_core.time_domain.liner.simulation import run_revolutions
 from sdm_core.validation import speeds as checked_speeds
 
 SPECTRUM_LINES, SPECTRUM_REVOLUTIONS = 400, 20
-_LONGEST_WAIT = 0.1  # s between checkpoints of the calling thread
 
 Progress = Callable[[int, int], None]
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -248,40 +244,6 @@ def speeds_as_they_come(
 
     threads = available_cores() if workers is None else checked_workers(workers)
     return in_threads(simulate, [float(one) for one in speed], threads)
-
-
-def in_threads(
-    work: Callable[[float], Result], parts: Sequence[float], workers: int
-) -> Generator[tuple[int, Result], None, None]:
-    """(index, result) of each part as they come; for work that leaves Python's lock alone.
-
-    When the caller gives up or a part fails, parts not begun are dropped, and those begun stop at their next
-    checkpoint.
-    """
-    given_up = threading.Event()
-
-    def check() -> None:
-        if given_up.is_set():
-            raise Cancelled("the caller gave up")
-
-    def watched(part: float) -> Result:
-        with interruptible(check):
-            return work(part)
-
-    with ThreadPoolExecutor(workers, thread_name_prefix="revolutions") as pool:
-        pending: dict[Future[Result], int] = {}
-        try:
-            pending = {pool.submit(watched, part): i for i, part in enumerate(parts)}
-            while pending:
-                done, _ = wait(pending, _LONGEST_WAIT, FIRST_COMPLETED)
-                checkpoint()
-                for future in done:
-                    i = pending.pop(future)
-                    yield i, future.result()
-        finally:
-            given_up.set()
-            for future in pending:
-                future.cancel()
 
 
 def _refuse_unseen(method: CentralDifferences, frequency_hz: np.ndarray, lowest_hz: float) -> None:

@@ -13,8 +13,9 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.stability import StabilitySolution, stability
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
 from sdm_core.time_domain.liner.rub_history import RubHistory
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, simulate_rub
+from sdm_core.time_domain.liner.simulation import simulate_rub
 
 KE = 1.3 * FLOOR_KE
 NUDGE = InitialMotion(np.array([1e-7 / AMPLITUDE]))

@@ -12,7 +12,8 @@ from sdm_core.interruption import interruptible
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner, Friction
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, simulate_rub
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
+from sdm_core.time_domain.liner.simulation import simulate_rub
 
 SOFT = AbradableLiner.from_cutting_stiffness(1e4)
 

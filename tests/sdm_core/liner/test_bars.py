@@ -14,7 +14,8 @@ from sdm_core.time_domain.liner.abradable_liner import AbradableLiner
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
 from sdm_core.time_domain.liner.liner_kernel import bar_force
-from sdm_core.time_domain.liner.simulation import LinerRub, simulate_rub
+from sdm_core.time_domain.liner.liner_rub import LinerRub
+from sdm_core.time_domain.liner.simulation import simulate_rub
 
 LINER = AbradableLiner(4e8, 2e5, 2e7, 5e-3, axial_width_m=3e-3, contact_length_m=1e-3)
 SPRING, HARDENING, YIELD, _ = (float(part[0]) for part in LINER.bars(1))

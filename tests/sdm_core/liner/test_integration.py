@@ -15,8 +15,9 @@ from sdm_core.time_domain.liner import plain_revolution
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner, Friction
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
 from sdm_core.time_domain.liner.rub_history import RubHistory
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, run_revolutions, simulate_rub
+from sdm_core.time_domain.liner.simulation import run_revolutions, simulate_rub
 
 FAR = Casing(0.25, 0.1)
 SOFT = AbradableLiner.from_cutting_stiffness(1e4, elastic_recovery=0.05)
@@ -141,6 +142,20 @@ def test_forces_of_several_nodes_belong_to_the_displacements_they_correct():
     rub = rotor_37(example_blade("nasa_rotor_37").tip_nodes, ke=1e6, elastic_recovery=0.3)
     found = simulate_rub(rub, 290.0, 6, CentralDifferences(500))
     assert 1 < found.correction_rounds < 50
+
+
+def test_two_nodes_that_move_as_one_are_one_node_of_twice_the_width():
+    shape = [[3.0, 3.0], [-5.0, -5.0]]
+    blade = Blade("pair", ("a", "b"), 1e-2, [ModalState(0.0, [100.0, 340.0], shape)])
+    casing = Casing(0.25, 1e-4, ovalisation_m=2e-4, ovalisation_revolutions=3.0)
+    wide = AbradableLiner.from_cutting_stiffness(2e5, elastic_recovery=0.2, yield_force_n=10.0)
+    narrow = replace(wide, axial_width_m=wide.axial_width_m / 2)
+    method = CentralDifferences(400, 1)
+    one = simulate_rub(LinerRub(blade, ("a",), wide, casing), 40.0, 8, method)
+    two = simulate_rub(LinerRub(blade, ("a", "b"), narrow, casing), 40.0, 8, method)
+    assert two.correction_rounds > 2
+    assert two.worn_m == pytest.approx(np.tile(one.worn_m, (2, 1)), abs=1e-12)
+    assert two.force_n.sum(axis=1) == pytest.approx(one.force_n[:, 0], abs=1e-6)
 
 
 def test_neither_the_sign_of_a_mode_nor_the_order_of_the_nodes_matters():

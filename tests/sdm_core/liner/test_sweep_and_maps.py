@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 from liner_rubs import one_mode, rotor_37
 
 from sdm_core.errors import Cancelled, InvalidInput
-from sdm_core.interruption import interruptible
+from sdm_core.interruption import checkpoint, interruptible
+from sdm_core.time_domain.in_threads import in_threads
 from sdm_core.time_domain.liner.abradable_liner import AbradableLiner
 from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
-from sdm_core.time_domain.liner.simulation import InitialMotion, LinerRub, run_revolutions, simulate_rub
+from sdm_core.time_domain.liner.liner_rub import InitialMotion, LinerRub
+from sdm_core.time_domain.liner.simulation import run_revolutions, simulate_rub
 from sdm_core.time_domain.liner.spectrum_map import SpectrumMap
 from sdm_core.time_domain.liner.speed_sweep import sweep_speeds
 from sdm_core.time_domain.liner.wear_lobes import wear_lobes
@@ -65,17 +68,36 @@ def test_a_liner_worn_through_at_one_speed_does_not_stop_the_others():
     assert full == [20] * (3 - len(expected))
 
 
-def test_a_sweep_that_is_given_up_stops_and_leaves_no_thread_behind():
-    calls = []
-
+def test_a_sweep_that_is_given_up_leaves_no_thread_behind():
     def soon() -> None:
-        calls.append(None)
         raise Cancelled("given up")
 
     with interruptible(soon), pytest.raises(Cancelled, match="given up"):
         sweep_speeds(rotor_37(), np.linspace(100.0, 300.0, 50), 2000, METHOD, frequency_hz=BANDS)
-    assert calls
     assert not [t for t in threading.enumerate() if t.name.startswith("revolutions")]
+
+
+def test_work_begun_in_threads_stops_at_its_next_checkpoint_when_the_caller_gives_up():
+    stopped, ran_out = [], []
+
+    def soon() -> None:
+        raise Cancelled("given up")
+
+    def patient(part: float) -> float:
+        try:
+            for _ in range(20_000):
+                checkpoint()
+                time.sleep(1e-3)
+        except Cancelled:
+            stopped.append(part)
+            raise
+        ran_out.append(part)
+        return part
+
+    with interruptible(soon), pytest.raises(Cancelled, match="given up"):
+        list(in_threads(patient, [1.0, 2.0, 3.0, 4.0], 2))
+    assert sorted(stopped) == [1.0, 2.0]
+    assert not ran_out
 
 
 def test_what_one_speed_cannot_take_is_refused_before_any_is_simulated():
@@ -110,6 +132,8 @@ def test_a_spectrum_shows_the_amplitude_of_a_sine_at_its_frequency():
     spectrum = found.spectrum(lines)
     assert lines[spectrum.argmax()] == pytest.approx(100.0, abs=0.1)
     assert spectrum.max() == pytest.approx(3e-5, rel=1e-3)
+    bent = replace(found, position=found.position + 1e-3)
+    assert bent.spectrum(np.linspace(0.0, 20.0, 21)).max() < 1e-6, "standing deflection is no vibration"
     with pytest.raises(InvalidInput, match="samples_per_revolution"):
         found.spectrum(np.linspace(0.0, 1e6, 10))
 

@@ -118,6 +118,17 @@ def test_a_bomb_that_lies_about_its_size_is_cut_short(uploads):
         (zipped(**{"a.json": b"{"}), ZIP),
         (zipped(**{"a.json": b'{"name": "x"}' * 50})[:60], ZIP),
     ],
+    # By words: a zip holds the time it was made, and test processes must agree on the names.
+    ids=[
+        "JSON cut off",
+        "no UTF-8",
+        "too deep",
+        "a line cut off",
+        "no zip",
+        "a member that is no JSON file",
+        "a member cut off",
+        "a zip cut off",
+    ],
 )
 def test_what_is_not_what_it_says_is_named(uploads, content, form):
     from sdm_core.errors import InvalidInput
