@@ -47,6 +47,15 @@ def run(
     friction: Annotated[
         Number, _option("--friction", "MU", "Coulomb friction of the tip; left out: none.", CONTACT)
     ] = None,
+    rotation: Annotated[
+        int,
+        typer.Option(
+            metavar="1|-1",
+            help="With --friction: 1 where the blade turns towards positive tangential, -1 where it turns the "
+            "other way.",
+            rich_help_panel=CONTACT,
+        ),
+    ] = 1,
     ke_liner: Annotated[
         Number,
         _option(
@@ -117,7 +126,7 @@ def run(
         write_bytes,
         write_json,
     )
-    from service.commands.simulation_inputs import casing_from, liner_from, named, order_from
+    from service.commands.simulation_inputs import casing_from, friction_from, liner_from, named, order_from
     from service.commands.simulation_tables import simulation_lines
     from service.simulation.charts import chart_files, chart_names
 
@@ -140,7 +149,8 @@ def run(
         radius_m=radius,
     )
     with named():
-        order = order_from(chosen, speed, count, nodes, revolutions, liner, casing, friction, cells)
+        rubbed = friction_from(friction, rotation)
+        order = order_from(chosen, speed, count, nodes, revolutions, liner, casing, rubbed, cells)
     charts = {} if png is None else {name: f"{png}/{name}" for name in chart_names(order)}
     check_writable(inputs=[blade], json=json, npz=npz)
     for path in charts.values():

@@ -33,6 +33,7 @@ _OPTIONS = {
     "radius_m": "--radius",
     "coefficient": "--friction",
     "friction": "--friction",
+    "rotation": "--rotation",
     "workers": "--threads",
     "cells": "--cells",
     "steps_per_cell": "--cells",
@@ -77,6 +78,15 @@ def casing_from(clearance: str | None, **given: float | None) -> CasingConstants
     return CasingConstants.from_dict(typed)
 
 
+def friction_from(coefficient: float | None, rotation: int) -> Friction | None:
+    """Friction as typed; none without a coefficient."""
+    if coefficient is None:
+        if rotation != 1:
+            raise InvalidInput("--rotation", rotation, "give --friction too, or leave it out")
+        return None
+    return Friction(coefficient, rotation)
+
+
 def order_from(
     blade: Blade,
     speed: str | None,
@@ -85,7 +95,7 @@ def order_from(
     revolutions: int,
     liner: LinerConstants,
     casing: CasingConstants,
-    friction: float | None,
+    friction: Friction | None,
     cells: int,
 ) -> SimulationOrder:
     """The order.
@@ -103,7 +113,7 @@ def order_from(
         revolutions,
         liner,
         casing,
-        None if friction is None else Friction(friction),
+        friction,
         cells,
     )
     check_reachable(order, settings_from(None))

@@ -48,13 +48,16 @@ def taken(order: SimulationOrder) -> str:
     moduli = (liner.youngs_modulus_pa, liner.yield_stress_pa, liner.plastic_modulus_pa)
     young, stress, plastic = (f"{pascals / 1e6:.4g} MPa" for pascals in moduli)
     rubbed = f"{order.liner.axial_width_m * 1e3:g} × {order.liner.contact_length_m * 1e3:g} mm"
+    friction, rubbing = order.friction, "none"
+    if friction is not None:
+        towards = "towards" if friction.rotation == 1 else "against"
+        rubbing = f"{friction.coefficient:g}, turning {towards} positive tangential"
     return (
         f"liner: K_e {order.ke:,.0f} N/m, {liner.thickness_m * 1e3:g} mm thick, rubbed {rubbed} a node "
         f"(E {young}, yield stress {stress}, plastic modulus {plastic}); "
         f"casing: radius {radius:.4g} m, {oval}, clearance {', '.join(f'{c:g}' for c in clearance)} µm, "
         f"feed {casing.feed_per_revolution_m * 1e6:g} µm a revolution; "
-        f"friction {'none' if order.friction is None else f'{order.friction.coefficient:g}'}; damping of the "
-        f"blade file; {order.cells} cells"
+        f"friction {rubbing}; damping of the blade file; {order.cells} cells"
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from service.screening.print_sheet import DPI, STYLES, as_png
 from service.simulation.order import SimulationOrder
@@ -55,6 +56,7 @@ def response_png(outcome: SimulationOutcome) -> bytes:
     for axes in (energy, modal):
         axes.set_xlabel("revolutions [-]")
     energy.set_xlim(0, response.revolutions)
+    modal.xaxis.set_major_locator(MaxNLocator(5))
     modal.set_xlim(turns[part][0], turns[part][-1])
     for axes in figure.axes:
         axes.tick_params(labelsize=9)

@@ -15,7 +15,7 @@ from sdm_core.time_domain.liner.spectrum_map import SpectrumMap
 from service.screening.print_sheet import DPI, as_png, legend_below
 from service.simulation.outcome import SimulationOutcome
 from service.simulation.titles import UNSTABLE, touching
-from service.simulation.wear_map_chart import mark_unstable, speed_axes
+from service.simulation.wear_map_chart import mark_unstable, nowhere_unstable, speed_axes
 
 _DECADES = 3
 _MOST_ORDERS, _MOST_ROWS = 14, 500
@@ -38,7 +38,10 @@ def spectrum_map_png(outcome: SimulationOutcome) -> bytes:
     figure = Figure(figsize=(8.6, 6.6), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    figure.suptitle(f"{order.blade.name}: {touching(order)}\nspectrum of {spectrum.node}", fontsize=11)
+    figure.suptitle(
+        f"{order.blade.name}: {touching(order)}\nspectrum of {spectrum.node}{nowhere_unstable(outcome)}",
+        fontsize=11,
+    )
     frequency, micrometres = _rows(spectrum)
     top = max(10.0 ** np.ceil(np.log10(max(float(micrometres.max()), 1e-9))), 1e-9)
     mesh = axes.pcolormesh(
@@ -67,9 +70,9 @@ def spectrum_map_png(outcome: SimulationOutcome) -> bytes:
     if at.any():
         mark: dict[str, Any] = {"ls": "none", "marker": "o", "mfc": "none", "mec": UNSTABLE, "mew": 1.1}
         axes.plot(found.speed_hz[at], found.chatter_hz[at], ms=5.0, **mark)
-        key.append(Line2D([], [], ms=5.0, label="its chatter frequency by the exact core", **mark))
+        key.append(Line2D([], [], ms=5.0, label="its chatter frequency", **mark))
     if len(outcome.lobes_hz):
-        key.append(mark_unstable(axes, outcome, up_to=0.025))
+        key.insert(2, mark_unstable(axes, outcome, up_to=0.025))
     legend_below(figure, key)
     return as_png(figure)
 

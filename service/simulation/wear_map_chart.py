@@ -36,9 +36,11 @@ def wear_map_png(outcome: SimulationOutcome, node: str | None = None) -> bytes:
     figure = Figure(figsize=(8.6, 6.6), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     deepest, plane = figure.subplots(2, 1, height_ratios=(1.0, 2.6), sharex=True)
-    figure.suptitle(f"{order.blade.name}: {touching(order)}\nworn depth under {wear.node}", fontsize=11)
+    said = f"worn depth under {wear.node}{nowhere_unstable(outcome)}"
+    figure.suptitle(f"{order.blade.name}: {touching(order)}\n{said}", fontsize=11)
     depth = wear.worn_m * 1e6
-    shown = max(float(np.percentile(depth, _SHOWN)), 1e-6)
+    # The same shades under every node.
+    shown = max(float(np.percentile(found.worn_m * 1e6, _SHOWN)), 1e-6)
     mesh = plane.pcolormesh(
         wear.speed_hz,
         wear.angle_rad,
@@ -76,7 +78,14 @@ def mark_unstable(axes: Axes, outcome: SimulationOutcome, up_to: float = 1.0) ->
     look: dict[str, Any] = {"facecolor": UNSTABLE, "alpha": 0.35 if up_to == 1.0 else 0.8, "lw": 0}
     for low, high in outcome.lobes_hz:
         axes.axvspan(low, high, ymax=up_to, **look)
-    return Patch(**look, label="unstable in permanent contact, by the exact core")
+    return Patch(**look, label="unstable in permanent contact (exact core)")
+
+
+def nowhere_unstable(outcome: SimulationOutcome) -> str:
+    """For a heading, where there is nothing to mark."""
+    if len(outcome.lobes_hz) or outcome.speeds.unstable.any():
+        return ""
+    return "; permanent contact stable at every speed (exact core)"
 
 
 def speed_edges(speed_hz: np.ndarray) -> np.ndarray:

@@ -62,6 +62,7 @@ def test_a_range_gives_maps_whose_unstable_speeds_lie_in_the_exact_lobes(tmp_pat
     done = run(*options, "--png", str(tmp_path / "charts"))
     assert done.exit_code == 0, done.output
     with np.load(npz) as kept:
+        np.testing.assert_array_equal(kept["speed_hz"], np.linspace(94.0, 101.0, 12))
         assert kept["worn_m"].shape == (12, 2, 1000)
         inside = [any(low <= hz <= high for low, high in kept["lobes_hz"]) for hz in kept["speed_hz"]]
         np.testing.assert_array_equal(kept["stable"] == 0.0, inside)
@@ -103,6 +104,8 @@ def test_a_liner_worn_through_is_shown_and_ends_with_status_1(tmp_path):
         (["--threads", "0"], "--threads = 0", "from 1 up"),
         (["--nodes", "LE,XX"], "XX", "LE"),
         (["--friction", "-0.1"], "--friction = -0.1", "from 0"),
+        (["--friction", "0.1", "--rotation", "2"], "--rotation = 2", "give 1"),
+        (["--rotation", "-1"], "--rotation = -1", "give --friction too"),
     ],
 )
 def test_bad_input_is_one_line_that_names_option_value_and_remedy(options, named, remedy):
