@@ -29,6 +29,7 @@ from service.rest.routes import (
     metrics,
     models,
     screenings,
+    simulations,
     stability,
     trainings,
     uploads,
@@ -112,6 +113,7 @@ def create_app(
     app.include_router(blades.router)
     app.include_router(models.router)
     app.include_router(screenings.router)
+    app.include_router(simulations.router)
     app.include_router(uploads.router)
     app.include_router(trainings.router)
     app.include_router(health.router)

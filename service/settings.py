@@ -52,7 +52,8 @@ class Settings(BaseSettings):
     run_jobs
         Whether this process runs jobs; without, it takes them for others that share the database.
     jobs_at_once
-        Screenings this process runs at the same time; they share its workers by priority.
+        Screenings, and as many simulations, this process runs at the same time; they share its workers by
+        priority.
     job_lease_s
         Time after which the jobs of a replica that says nothing any more are taken over, s.
     engine_workers
@@ -73,6 +74,12 @@ class Settings(BaseSettings):
         Contacts of one screening.
     max_job_results
         Blades times contacts of one screening.
+    max_simulation_speeds, max_simulation_revolutions
+        Of one simulation.
+    max_simulation_steps
+        Steps of one simulation in all: speeds × revolutions × cells × steps a cell; 1e9 take some minutes.
+    max_simulation_values
+        Numbers kept of one speed while it is simulated: 8 bytes each.
     keep_jobs_days, keep_uploads_days
         Jobs that are over, and uploads, are deleted after so many days; 0 keeps them for good.
     max_body_bytes
@@ -151,6 +158,10 @@ class Settings(BaseSettings):
     max_job_blades: Count = 20_000
     max_job_contacts: Count = 20
     max_job_results: Count = 100_000
+    max_simulation_speeds: Count = 1000
+    max_simulation_revolutions: Count = 1000
+    max_simulation_steps: Count = 20_000_000_000
+    max_simulation_values: Count = 20_000_000
     keep_jobs_days: Annotated[float, Ge(0)] = 90.0
     keep_uploads_days: Annotated[float, Ge(0)] = 7.0
     max_body_bytes: Count = 16 * 2**20

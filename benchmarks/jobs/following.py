@@ -22,20 +22,24 @@ def submit(url: str, question: dict[str, Any], key: str, path: str = "/v1/screen
     return reply.json()["id"]
 
 
-def state_of(url: str, job: str) -> dict[str, Any]:
+def state_of(url: str, job: str, path: str = "/v1/screenings") -> dict[str, Any]:
     """The job document."""
-    reply = httpx.get(f"{url}/v1/screenings/{job}", timeout=30.0)
+    reply = httpx.get(f"{url}{path}/{job}", timeout=30.0)
     reply.raise_for_status()
     return reply.json()
 
 
 def until_over(
-    url: str, job: str, patience_s: float, look: Callable[[dict[str, Any]], None] | None = None
+    url: str,
+    job: str,
+    patience_s: float,
+    look: Callable[[dict[str, Any]], None] | None = None,
+    path: str = "/v1/screenings",
 ) -> dict[str, Any]:
     """Wait for the end of a job; `look` sees it on the way."""
     end = time.monotonic() + patience_s
     while True:
-        document = state_of(url, job)
+        document = state_of(url, job, path)
         if look is not None:
             look(document)
         if document["state"] in OVER:
@@ -48,7 +52,7 @@ def until_over(
 def content_of(data: Path, job: str) -> dict[str, str]:
     """SHA-256 of every result file of a job, by name."""
     folder = data / "jobs" / job
-    files = [*sorted((folder / "chunks").iterdir()), folder / "results.parquet"]
+    files = [*sorted((folder / "chunks").iterdir()), *folder.glob("results.parquet")]
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 

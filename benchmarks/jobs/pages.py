@@ -21,13 +21,13 @@ import numpy as np
 from benchmarks.jobs.service_process import ServiceProcess
 from benchmarks.jobs.variants import variants
 from sdm_core.contact import ContactConfiguration
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.job import SCREENING, Job, State
 from service.jobs.job_folder import JobFolders
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import limits_of
 from service.jobs.screening.chunk import chunk_payload, compute_chunk
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import Criteria, ScreeningRequest
 from service.jobs.screening.results import write_results
 from service.records.database import open_database

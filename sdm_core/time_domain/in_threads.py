@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 def in_threads(
     work: Callable[[Part], Result], parts: Sequence[Part], workers: int
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     """(index, result) of each part as they come; for work that leaves Python's lock alone.
 
     When the caller gives up or a part fails, parts not begun are dropped, and those begun stop at their next

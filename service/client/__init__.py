@@ -6,6 +6,7 @@ from service.client.patience import Patience
 from service.client.problem import ServiceProblem
 from service.client.progress import job_bar, progress_bar
 from service.client.screening_results import NotScreened, ScreeningResults, ScreeningRow
+from service.client.simulation_conversations import SimulationResults
 from service.client.sync_client import Client
 from service.rest.training_question import TrainingQuestion
 
@@ -19,6 +20,7 @@ __all__ = [
     "ScreeningResults",
     "ScreeningRow",
     "ServiceProblem",
+    "SimulationResults",
     "StillUnderWay",
     "TrainingQuestion",
     "job_bar",

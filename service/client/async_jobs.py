@@ -1,9 +1,9 @@
-"""What `AsyncClient` does about jobs: batches of blades and trainings."""
+"""What `AsyncClient` does about jobs: batches of blades, trainings, simulations."""
 
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from typing import TypeVar
 
@@ -14,6 +14,7 @@ from service.client import (
     training_conversations,
     uploading,
 )
+from service.client.async_simulations import AsyncClientOfSimulations
 from service.client.job_conversations import SCREENINGS, TRAININGS, Watch
 from service.client.job_status import JobStatus
 from service.client.message import Conversation
@@ -29,7 +30,7 @@ from service.screening.screen import KE_MAX
 T = TypeVar("T")
 
 
-class AsyncClientOfJobs(ABC):
+class AsyncClientOfJobs(AsyncClientOfSimulations):
     """As `ClientOfJobs`, parameter by parameter and method by method, awaited."""
 
     _patience: Patience

@@ -1,4 +1,4 @@
-"""The conversations about jobs of either kind: seen, waited for, listed, cancelled, run again."""
+"""The conversations about jobs of any kind: seen, waited for, listed, cancelled, run again."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from service.jobs.job import State
 from service.rest.job_schemas import JobReply, JobsReply
 
 T = TypeVar("T")
-SCREENINGS, TRAININGS = "/v1/screenings", "/v1/trainings"
+SCREENINGS, TRAININGS, SIMULATIONS = "/v1/screenings", "/v1/trainings", "/v1/simulations"
 Watch = Callable[[JobStatus], None]
 """Told a job at every change."""
 
@@ -34,7 +34,7 @@ _TRIES = 5
 
 
 def job(path: str, job_id: str) -> Conversation[JobStatus]:
-    """``GET /v1/screenings/{id}`` or ``GET /v1/trainings/{id}``."""
+    """``GET /v1/screenings/{id}``, and so for the other kinds."""
     return status_of(Message.get(job_path(path, job_id)))
 
 

@@ -18,7 +18,7 @@ class JobProgress:
     Attributes
     ----------
     done, total
-        For a screening the blades.
+        For a screening the blades, for a simulation the speeds.
     share
         0 to 1.
     remaining_s
@@ -41,7 +41,7 @@ class JobStatus:
     id
         32 hexadecimal digits.
     kind
-        ``screening`` or ``training``.
+        ``screening``, ``training`` or ``simulation``.
     waiting_for
         What it waits for, where it cannot go on by itself just now.
     created_at, started_at, finished_at

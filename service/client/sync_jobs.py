@@ -1,9 +1,9 @@
-"""What `Client` does about jobs: batches of blades and trainings."""
+"""What `Client` does about jobs: batches of blades, trainings, simulations."""
 
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
@@ -20,6 +20,7 @@ from service.client.message import Conversation
 from service.client.patience import Patience
 from service.client.screening_order import Contacts
 from service.client.screening_results import ScreeningResults
+from service.client.sync_simulations import ClientOfSimulations
 from service.client.uploading import BladeLike
 from service.jobs.screening.request import Criteria
 from service.rest.job_schemas import ScheduleReply, TrainedReply, UploadReply
@@ -29,7 +30,7 @@ from service.screening.screen import KE_MAX
 T = TypeVar("T")
 
 
-class ClientOfJobs(ABC):
+class ClientOfJobs(ClientOfSimulations):
     """Jobs over REST."""
 
     _patience: Patience

@@ -27,6 +27,14 @@ class NotTrained(InvalidInput):
     """The training has no model, or not yet."""
 
 
+class NotSimulated(InvalidInput):
+    """There is no such result of the simulation, or not yet."""
+
+
+class TooLargeForWorker(InvalidInput):
+    """A part of a job ends every worker that computes it."""
+
+
 class NoSuchUpload(InvalidInput):
     """There is no upload of this identifier."""
 

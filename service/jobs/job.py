@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any
 
-SCREENING, TRAINING = "screening", "training"
-KINDS = (SCREENING, TRAINING)
+SCREENING, TRAINING, SIMULATION = "screening", "training", "simulation"
+KINDS = (SCREENING, TRAINING, SIMULATION)
 LONGEST_NAME = 200  # characters
 # 1 is first.
 FIRST_PRIORITY, USUAL_PRIORITY, LAST_PRIORITY = 1, 5, 9
@@ -70,7 +70,7 @@ class Job:
     attempt
         How often it was started by request: 1, and one more for each retry.
     done, total, stage
-        Units of work; for a screening the blades.
+        Units of work; for a screening the blades, for a simulation the speeds.
     not_screened
         Blades that could not be.
     waiting_for
@@ -143,8 +143,14 @@ class Job:
 
     def _links(self) -> dict[str, str]:
         base = f"/v1/{self.kind}s/{self.id}"
-        parts = ("results", "events", "report") if self.kind == SCREENING else ("events",)
-        return {"self": base, **{part: f"{base}/{part}" for part in parts}}
+        return {"self": base, **{part: f"{base}/{part}" for part in _LINKS[self.kind]}}
+
+
+_LINKS = {
+    SCREENING: ("results", "events", "report"),
+    TRAINING: ("events",),
+    SIMULATION: ("results", "events"),
+}
 
 
 def _iso(at: datetime | None) -> str | None:

@@ -2,7 +2,7 @@
 
 jobs/ID/request.json          what was asked, the model's identifier included
 jobs/ID/blades.jsonl          one blade or profile a line (screenings)
-jobs/ID/chunks/NNNNNN-SHA.npz results as they come, named by their checksum (screenings)
+jobs/ID/chunks/NNNNNN-SHA.npz results as they come, named by their checksum (screenings, simulations)
 jobs/ID/results.parquet       the ranking, once it is complete (screenings)
 jobs/ID/log.jsonl             what was begun and what was stored, when
 uploads/ID/                   files sent ahead

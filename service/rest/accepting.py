@@ -14,19 +14,22 @@ from typing import Any
 from sdm_core.errors import InvalidInput
 from sdm_core.interruption import checkpoint
 from service.jobs.durable_files import write_durably
-from service.jobs.job import ACTIVE, SCREENING, TRAINING, Job
+from service.jobs.job import ACTIVE, SCREENING, SIMULATION, TRAINING, Job
 from service.jobs.job_folder import REQUEST
 from service.jobs.jobs import Jobs
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import blades_per_chunk, check_line, under_source
 from service.jobs.screening.request import ScreeningRequest
+from service.jobs.simulation.chunk import speeds_per_chunk
 from service.jobs.training.request import TrainingRequest
 from service.jobs.uploads import Uploads
 from service.rest.access import Caller
 from service.rest.models_folder import models_folder
 from service.rest.screening_question import ScreeningQuestion
+from service.rest.simulation_question import SimulationQuestion
 from service.settings import Settings
+from service.simulation.order import SimulationOrder
 from service.sizes import TooLarge
 
 IDEMPOTENCY_KEY = "Idempotency-Key"
@@ -143,6 +146,21 @@ def _lines(
             kept = isinstance(document, dict) and len(json.dumps(document)) <= _SMALL
             line = BladeLine(index, source, document if kept else {})
         yield line
+
+
+def simulation_job(ask: SimulationQuestion, caller: Caller, body: bytes, key: str | None) -> Job:
+    """The job a question asks for, not handed in yet."""
+    return new_job(SIMULATION, caller, body, key, name=ask.name, priority=ask.priority)
+
+
+def accept_simulation(order: SimulationOrder, job: Job, jobs: Jobs) -> tuple[Job, bool]:
+    """Hand a simulation in: the job, and whether it is new."""
+
+    def fill(folder: Path) -> None:
+        document = order.to_dict() | {"speeds_per_chunk": speeds_per_chunk(order)}
+        write_durably(folder / REQUEST, json.dumps(document, indent=1).encode())
+
+    return jobs.submit(job, fill)
 
 
 def accept_training(request: TrainingRequest, job: Job, jobs: Jobs) -> tuple[Job, bool]:

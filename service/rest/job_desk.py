@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sdm_core.errors import InvalidInput
 from service.jobs.engine import DaskEngine, Engine, Tls, checked_scheduler
-from service.jobs.job import SCREENING, TRAINING
+from service.jobs.job import SCREENING, SIMULATION, TRAINING
 from service.jobs.job_folder import SCRATCH
 from service.jobs.jobs import Jobs, JobSettings, Kind, alone
 from service.jobs.retention import Keep
@@ -15,6 +15,7 @@ from service.jobs.screening.checks import limits_of
 from service.jobs.screening.kind import ScreeningKind
 from service.jobs.screening.rankings import Rankings
 from service.jobs.screening.watched import OnStored
+from service.jobs.simulation.kind import SimulationKind
 from service.jobs.training.kind import TrainingKind
 from service.jobs.uploads import Uploads
 from service.records.database import Database, open_database
@@ -55,8 +56,10 @@ class JobDesk:
                 engine, limits_of(settings), settings.min_free_bytes, models_folder, on_stored
             ),
             TRAINING: TrainingKind(models_folder, settings.served_answers_folder, settings.min_free_bytes),
+            SIMULATION: SimulationKind(engine, settings.min_free_bytes),
         }
-        at_once = {SCREENING: settings.jobs_at_once, TRAINING: 1} if settings.run_jobs else {}
+        many = settings.jobs_at_once
+        at_once = {SCREENING: many, TRAINING: 1, SIMULATION: many} if settings.run_jobs else {}
         keep = Keep(settings.keep_jobs_days, settings.keep_uploads_days)
         how = JobSettings(at_once, settings.job_lease_s, settings.min_free_bytes, keep)
         jobs = Jobs(database, data_folder, kinds, how, train_when_due)

@@ -14,7 +14,7 @@ class ProgressReply(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    done: int = Field(description="Blades, for a screening.")
+    done: int = Field(description="Blades of a screening, speeds of a simulation.")
     total: int
     stage: str
     share: float = Field(description="0 to 1.")
@@ -37,7 +37,7 @@ class JobReply(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     id: str
-    kind: Literal["screening", "training"]
+    kind: Literal["screening", "training", "simulation"]
     name: str | None
     state: JobState
     waiting_for: str | None = Field(description="Say room on the disk; it goes on by itself.")

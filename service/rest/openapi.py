@@ -26,6 +26,7 @@ from service.rest.question_schemas import BLADE, CONTACT
 from service.rest.questions import BoundaryQuestion, MapQuestion, PointsQuestion, SensitivitiesQuestion
 from service.rest.schemas import ProblemDocument
 from service.rest.screening_question import ScreeningQuestion
+from service.rest.simulation_question import SimulationQuestion
 from service.rest.training_question import ScheduleQuestion, TrainingQuestion
 
 Json = dict[str, Any]
@@ -135,6 +136,7 @@ def _components() -> Json:
         MapQuestion,
         BladeQuestion,
         ScreeningQuestion,
+        SimulationQuestion,
         TrainingQuestion,
         ScheduleQuestion,
         PromotionQuestion,

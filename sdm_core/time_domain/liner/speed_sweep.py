@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -204,7 +204,7 @@ def speeds_as_they_come(
     initial: InitialMotion | None = None,
     extrapolate: bool = False,
     workers: int | None = None,
-) -> Iterator[tuple[int, SpeedResult]]:
+) -> Generator[tuple[int, SpeedResult], None, None]:
     """(index of the speed, result), in any order.
 
     In threads: the compiled revolutions do not hold Python's lock, and nothing has to be sent about. A liner

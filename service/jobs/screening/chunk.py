@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 from collections.abc import Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from sdm_core.errors import Cancelled, RubscreenError
+from service.jobs.modesty import be_modest
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import check_fit, check_line
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade, UnscreenedBlade
@@ -22,7 +22,6 @@ from service.settings import Settings
 from training.registry import SHIPPED
 from training.screening import Screener
 
-_NICE = 10
 logger = logging.getLogger("rubscreen.jobs")
 
 
@@ -41,7 +40,8 @@ def compute_in_worker(payload: bytes) -> bytes:
     Cancelled
         When nobody waits for it any more.
     """
-    _be_modest()
+    be_modest()
+    _on_one_thread()
     with while_wanted():
         return compute_chunk(payload)
 
@@ -114,11 +114,8 @@ def _screener(models_folder: str | None, model: str | None) -> Screener:
 
 
 @cache
-def _be_modest() -> None:
+def _on_one_thread() -> None:
     """Once a process."""
-    os.environ.setdefault("RUBSCREEN_WORKER", "1")
     import torch
 
     torch.set_num_threads(1)
-    if os.environ.get("RUBSCREEN_WORKER_NICE", "1") != "0" and hasattr(os, "nice"):
-        os.nice(_NICE)

@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 import logging
-import time
-from collections import deque
-from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Mapping
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sdm_core.errors import RubscreenError
 from sdm_core.interruption import interruptible
+from service.jobs.chunk_run import LOOK_EVERY_S, ChunkRun
 from service.jobs.control import Control
-from service.jobs.durable_files import check_room, is_full
-from service.jobs.engine import Engine, EngineGone, WorkerKilled
-from service.jobs.errors import NoRoom
+from service.jobs.engine import Engine, WorkerKilled
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.blade_lines import BladeLine, read_chunks
 from service.jobs.screening.chunk import chunk_payload, compute_in_worker
 from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade, rows_of
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import ScreeningRequest
 from service.jobs.screening.results import write_results
 from service.jobs.screening.watched import OnStored
 
-# Chunks in the engine for each of its workers: enough that none waits, few enough that another job gets in.
-_AHEAD = 2
-_LOOK_EVERY_S = 0.2
 _ALONE_KILLS = "its computation ended the worker, in each of several tries: too large, or a fault of ours"
 logger = logging.getLogger("rubscreen.jobs")
 
@@ -88,75 +80,41 @@ class ScreeningKind:
         if self._models is not None:
             asked["models_folder"] = str(self._models.resolve())
         request = ScreeningRequest.from_dict(asked)
-        store = ChunkStore(folder.chunks)
+        run: ChunkRun[list[BladeLine]] = ChunkRun(self._engine, folder, control, self._reserve)
         control.report(stage="looking at what is stored", now=True)
         # Each is read once: to look a single one up means to list them all.
         stored = {}
-        for number, content in store.whole():
+        for number, content in run.store.whole():
             stored[number] = len(rows_of(content)[1])
             control.check()
         tally = _Tally(sum(1 for _ in read_chunks(folder.path, 1)))
-        left = []
+        left = set()
         for number, blades in read_chunks(folder.path, request.blades_per_chunk):
             if number in stored:
                 tally.done += len(blades)
                 tally.not_screened += stored[number]
             else:
-                left.append(number)
+                left.add(number)
             control.check()
         control.report(total=tally.total, done=tally.done, not_screened=tally.not_screened, now=True)
         control.report(stage="starting workers", now=True)
-        self._compute(folder, asked, request, left, store, control, tally)
+
+        def told(blades: list[BladeLine], content: bytes) -> None:
+            self._on_stored(content)
+            tally.done += len(blades)
+            tally.not_screened += len(rows_of(content)[1])
+            control.report(done=tally.done, not_screened=tally.not_screened, stage="screening")
+
+        run.compute(
+            (c for c in read_chunks(folder.path, request.blades_per_chunk) if c[0] in left),
+            lambda blades: self._submit(asked, blades, control),
+            lambda future, blades: self._content(future, asked, blades, control),
+            told,
+        )
         control.report(stage="ranking", now=True)
         with interruptible(control.check):  # 100,000 rows take some twenty seconds
-            self._keep(control, partial(write_results, folder, request))
+            run.keep(partial(write_results, folder, request))
         control.report(stage="", done=tally.done, now=True)
-
-    def _compute(
-        self,
-        folder: JobFolder,
-        asked: dict[str, Any],
-        request: ScreeningRequest,
-        left: list[int],
-        store: ChunkStore,
-        control: Control,
-        tally: _Tally,
-    ) -> None:
-        wanted = set(left)
-        chunks = (c for c in read_chunks(folder.path, request.blades_per_chunk) if c[0] in wanted)
-        again: deque[tuple[int, list[BladeLine]]] = deque()
-        pending: dict[Future[bytes], tuple[int, list[BladeLine]]] = {}
-        try:
-            while True:
-                most = max(1, _AHEAD * self._slots(control))
-                while len(pending) < most and (chunk := again.popleft() if again else next(chunks, None)):
-                    folder.note(event="submitted", chunk=chunk[0])
-                    try:
-                        pending[self._submit(asked, chunk[1], control)] = chunk
-                    except EngineGone as gone:
-                        again.append(chunk)
-                        self._lost(gone, control)
-                if not pending:
-                    return
-                done, _ = wait(pending, _LOOK_EVERY_S, FIRST_COMPLETED)
-                control.check()
-                for future in done:
-                    number, blades = chunk = pending.pop(future)
-                    try:
-                        content = self._content(future, asked, blades, control)
-                    except EngineGone as gone:
-                        again.append(chunk)
-                        self._lost(gone, control)
-                        continue
-                    self._keep(control, partial(store.put, number, content), len(content))
-                    folder.note(event="stored", chunk=number)
-                    self._on_stored(content)
-                    tally.done += len(blades)
-                    tally.not_screened += len(rows_of(content)[1])
-                    control.report(done=tally.done, not_screened=tally.not_screened, stage="screening")
-        finally:
-            for future in pending:
-                future.cancel()
 
     def _submit(self, asked: dict[str, Any], blades: list[BladeLine], control: Control) -> Future[bytes]:
         payload = chunk_payload(asked, blades, self._limits)
@@ -174,7 +132,7 @@ class ScreeningKind:
         for blade in blades:
             alone = self._submit(asked, [blade], control)
             try:
-                while not wait([alone], _LOOK_EVERY_S).done:
+                while not wait([alone], LOOK_EVERY_S).done:
                     control.check()
             except BaseException:
                 alone.cancel()
@@ -185,41 +143,3 @@ class ScreeningKind:
                 lost = UnscreenedBlade(blade.index, blade.source, blade.name, _ALONE_KILLS)
                 parts.append(ChunkContent((), (lost,)))
         return ChunkContent.joined(parts).to_bytes()
-
-    def _slots(self, control: Control) -> int:
-        """Workers there are; waits while there are none."""
-        while True:
-            try:
-                slots = self._engine.slots()
-            except EngineGone as gone:
-                self._lost(gone, control)
-                continue
-            if slots:
-                control.wait_for(None)
-                return slots
-            control.wait_for("a worker: the scheduler has none")
-            control.sleep(1.0)
-
-    def _lost(self, gone: RubscreenError, control: Control) -> None:
-        control.wait_for(f"the workers: {gone}")
-        control.sleep(1.0)
-
-    def _keep(self, control: Control, write: Callable[[], None], size: int = 0) -> None:
-        """Write, waiting for room on the disk as long as it takes: what was computed is not lost."""
-        began = time.monotonic()
-
-        def ready() -> str | None:
-            try:
-                check_room(control.folder, size, self._reserve)
-                write()
-            except NoRoom as full:
-                return f"room on the disk: {full}"
-            except OSError as error:
-                if not is_full(error):
-                    raise
-                return "room on the disk: it is full"
-            return None
-
-        control.until(ready)
-        if (waited := time.monotonic() - began) > 2.0:
-            logger.warning("job %s waited %.0f s for the disk", control.job.id, waited)

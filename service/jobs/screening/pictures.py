@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any
 
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.errors import NotScreened
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.chunk_content import ChunkContent, ScreenedBlade
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.rankings import Ranking
 from service.jobs.screening.request import ScreeningRequest
 from service.screening.batch import Failure, ScreenedBatch

@@ -16,9 +16,9 @@ import pyarrow.parquet as pq
 
 from sdm_core.errors import DamagedFile
 from sdm_core.interruption import checkpoint
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.chunk_content import UnscreenedBlade
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import ScreeningRequest
 from service.jobs.screening.results import (
     FILE,

@@ -13,10 +13,10 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from sdm_core.interruption import checkpoint
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.durable_files import write_durably
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening.chunk_content import UnscreenedBlade, rows_of
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import Criteria, ScreeningRequest
 
 FILE = "results.parquet"

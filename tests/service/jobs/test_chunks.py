@@ -9,12 +9,12 @@ from sdm_core.blade import blade_to_dict, example_blade
 from sdm_core.boundary import verdicts
 from sdm_core.contact import ContactConfiguration
 from sdm_core.errors import DamagedFile
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.checks import blades_per_chunk, limits_of
 from service.jobs.screening.chunk import chunk_payload, compute_chunk
 from service.jobs.screening.chunk_content import ChunkContent, rows_of
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.request import Criteria, ScreeningRequest
 from service.jobs.screening.watched import watching
 from service.screening.screen import screen

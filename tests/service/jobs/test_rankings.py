@@ -14,9 +14,9 @@ import pytest
 
 from sdm_core.errors import Cancelled, DamagedFile
 from sdm_core.interruption import interruptible
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.job_folder import JobFolder
 from service.jobs.screening import rankings
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.rankings import Rankings
 from service.jobs.screening.request import Criteria, ScreeningRequest
 from service.jobs.screening.results import FILE, ROWS_IN_GROUP, SCHEMA, write_results

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from sdm_core.errors import Cancelled
+from service.jobs.chunk_store import ChunkStore
 from service.jobs.control import Control
 from service.jobs.durable_files import free_bytes
 from service.jobs.engine import EngineGone, WorkerKilled
@@ -20,7 +21,6 @@ from service.jobs.job_folder import JobFolder
 from service.jobs.screening import blade_lines
 from service.jobs.screening.blade_lines import BladeLine
 from service.jobs.screening.chunk_content import ChunkContent, UnscreenedBlade
-from service.jobs.screening.chunk_store import ChunkStore
 from service.jobs.screening.kind import ScreeningKind
 from service.jobs.screening.rankings import Rankings
 from service.jobs.screening.request import ScreeningRequest

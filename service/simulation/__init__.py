@@ -1,0 +1,1 @@
+"""Simulations of a rubbed liner as they are ordered, run, kept and drawn."""
