@@ -51,8 +51,8 @@ def run(
         int,
         typer.Option(
             metavar="1|-1",
-            help="With --friction: 1 where the blade turns towards positive tangential, -1 where it turns the "
-            "other way.",
+            help="With --friction: 1 where the blade turns towards positive tangential, -1 where it turns "
+            "the other way.",
             rich_help_panel=CONTACT,
         ),
     ] = 1,

@@ -59,7 +59,7 @@ def test_the_commands_of_a_page_print_what_it_says(page, tmp_path, monkeypatch):
 
 def plain(text: str) -> str:
     """Without the lines of tables."""
-    return re.sub(r"[━─┃│┏┓┗┛┡┩╇┳┻└┘┴├┤┼╭╮╰╯]", " ", text)
+    return re.sub(r"[━─┃│┏┓┗┛┡┩╇┳┻┌┐┬└┘┴├┤┼╭╮╰╯]", " ", text)
 
 
 @pytest.mark.parametrize(
