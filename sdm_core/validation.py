@@ -39,6 +39,20 @@ def number(field: str, value: Any, low: float, high: float, unit: str, *, open_l
     return x
 
 
+def whole(field: str, value: Any, low: int, high: int) -> int:
+    """`value` as an integer within [low, high].
+
+    Raises
+    ------
+    InvalidInput
+        Naming the field, the value and the range.
+    """
+    right = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not right or not low <= value <= high:
+        raise InvalidInput(field, value, f"give a whole number from {low:,} to {high:,}")
+    return int(value)
+
+
 def vector(
     field: str, values: Any, low: float, high: float, unit: str, *, open_low: bool = False
 ) -> np.ndarray:

@@ -14,6 +14,7 @@ _MOST_SAMPLES = 20_000
 _FEWEST_REVOLUTIONS = 6
 _FAINTEST = 1e-9  # of the strongest motion: fainter ones are the integration's error
 _WINDOWS = 4
+_AT_REST = 1e-290  # below, numbers have lost their digits
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,15 @@ def fitted_growth(motion: Motion) -> FittedGrowth:
     InvalidInput
         When there are too few revolutions, or nothing moves.
     """
+    if not isinstance(motion, Motion):
+        raise InvalidInput("motion", type(motion).__name__, "give a Motion, as `integrated` returns it")
     count = len(motion.revolutions)
     if count < _FEWEST_REVOLUTIONS:
         remedy = f"integrate {_FEWEST_REVOLUTIONS} or more"
         raise InvalidInput("revolutions", count, remedy)
     used = max(_FEWEST_REVOLUTIONS, count // 2)
     snapshots, times = _snapshots(motion, used)
-    if not np.abs(snapshots).max() > 0:
+    if not np.abs(snapshots).max() > _AT_REST:
         raise InvalidInput("motion", "at rest", "give a displacement that the modes take part in")
     multiplier, shape = _strongest(snapshots)
     hz = _frequency(motion, multiplier, shape, times)

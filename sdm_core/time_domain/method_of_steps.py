@@ -20,6 +20,7 @@ from sdm_core.time_domain.revolution import Revolution
 from sdm_core.time_domain.revolution_kernel import one_revolution
 from sdm_core.time_domain.revolution_mesh import RevolutionMesh
 from sdm_core.time_domain.runge_kutta import ERROR_ORDER
+from sdm_core.validation import number, vector
 
 RTOL = 1e-10
 """Error of a step that is let pass, relative to the largest state of its revolution and the one before."""
@@ -48,7 +49,7 @@ class MethodOfSteps:
     Raises
     ------
     InvalidInput
-        When `rtol` cannot be met in double precision, or is no tolerance.
+        When `rtol` cannot be met in double precision, or equation, weights or tolerance are none.
     """
 
     equation: DelayEquation
@@ -56,9 +57,16 @@ class MethodOfSteps:
     rtol: float = RTOL
 
     def __post_init__(self) -> None:
-        if not TIGHTEST <= self.rtol <= LOOSEST:
-            remedy = f"give a tolerance from {TIGHTEST:g} to {LOOSEST:g}"
-            raise InvalidInput("rtol", self.rtol, remedy)
+        if not isinstance(self.equation, DelayEquation):
+            remedy = "give a DelayEquation, e.g. problem.delay_equation()"
+            raise InvalidInput("equation", type(self.equation).__name__, remedy)
+        number("rtol", self.rtol, TIGHTEST, LOOSEST, "")
+        if self.weights is not None:
+            size = self.equation.size
+            given = vector("weights", self.weights, 0.0, 1e300, "", open_low=True)
+            if len(given) != size:
+                raise InvalidInput("weights", f"{len(given)} numbers", f"give one a coordinate: {size}")
+            object.__setattr__(self, "weights", given)
 
     def first_mesh(self) -> RevolutionMesh:
         """Steps as long as they can possibly be."""
@@ -89,12 +97,17 @@ class MethodOfSteps:
         ------
         TooMuchWork
             When the tolerance takes more than `MOST_STEPS` steps.
+        InvalidInput
+            When the motion grows beyond all numbers.
         """
         mesh, beginning = before.mesh, before.ends[-1] if start is None else start
         weights = np.ones(self.equation.size) if self.weights is None else self.weights
         for _ in range(_MOST_TRIES):
             checkpoint()
             found, error = self.over(mesh, before, beginning)
+            if not (np.isfinite(found.ends).all() and np.isfinite(error).all()):
+                remedy = "the motion grows beyond all numbers: ask for fewer revolutions or a smaller ke"
+                raise InvalidInput("revolutions", "overflow", remedy)
             allowed = self.rtol * max((weights * found.largest).max(), (weights * before.largest).max())
             excess = 0.0 if allowed == 0 else (weights * error).max(axis=1) / allowed
             if np.all(excess <= 1.0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from sdm_core.errors import InvalidInput
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.time_domain.method_of_steps import RTOL, MethodOfSteps
 from sdm_core.time_domain.revolution import Revolution
+from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, matrix, number, vector, whole
 
 Progress = Callable[[int, int], None]
 MOST_REVOLUTIONS = 100_000
+_LARGEST_HISTORY = 1e6  # kg^1/2 m: no blade is a tenth as far out
 
 
 @dataclass(frozen=True)
@@ -45,15 +48,10 @@ class Motion:
         Raises
         ------
         InvalidInput
-            For a time outside.
+            For a time outside, or what is none.
         """
-        times = np.atleast_1d(np.asarray(times, dtype=float))
         slack = 1e-9 * self.problem.tau
-        outside = ~((times >= -slack) & (times <= self.duration + slack))
-        if outside.any():
-            i = int(np.argmax(outside))
-            remedy = f"give times from 0 to {self.duration:g} s, the end of the last revolution"
-            raise InvalidInput(f"times[{i}]", float(times[i]), remedy)
+        times = vector("times", times, -slack, self.duration + slack, "s, the end of the last revolution")
         tau, n = self.problem.tau, len(self.problem.omega)
         turn = np.clip(np.floor(times / tau).astype(int), 0, len(self.revolutions) - 1)
         states = np.empty((len(times), 2 * n))
@@ -64,7 +62,11 @@ class Motion:
 
     def displacement(self, times: np.ndarray, mode_shape: np.ndarray) -> np.ndarray:
         """Displacement at nodes, m, shape (m, r), from their mode shapes V_b, kg^-1/2, shape (n, r)."""
-        return self.at(times)[0] @ mode_shape
+        modes = len(self.problem.omega)
+        shape = matrix("mode_shape", mode_shape, None, -AMPLITUDE_LIMIT, AMPLITUDE_LIMIT, "kg^-1/2")
+        if len(shape) != modes:
+            raise InvalidInput("mode_shape", f"{len(shape)} rows", f"give one row a mode: {modes}")
+        return self.at(times)[0] @ shape
 
 
 def integrated(
@@ -92,7 +94,8 @@ def integrated(
     Raises
     ------
     InvalidInput
-        When the history is not n finite numbers, or the count or the tolerance is out of range.
+        When the history is not n finite numbers, the count or the tolerance is out of range, or the motion
+        grows beyond all numbers.
     TooMuchWork
         When the tolerance takes too many steps.
 
@@ -104,14 +107,12 @@ def integrated(
     >>> float(abs(motion.at([0.01])[0][0, 0] - np.exp(-0.002 * 2 * np.pi))) < 1e-5
     True
     """
+    check_problem(problem)
     n = len(problem.omega)
-    held = np.asarray(history, dtype=float)
-    if held.shape != (n,) or not np.isfinite(held).all():
-        raise InvalidInput("history", history, f"give {n} finite numbers, one a mode")
-    if isinstance(revolutions, bool) or not isinstance(revolutions, int | np.integer):
-        raise InvalidInput("revolutions", revolutions, "give a whole number")
-    if not 1 <= revolutions <= MOST_REVOLUTIONS:
-        raise InvalidInput("revolutions", revolutions, f"give 1 to {MOST_REVOLUTIONS:,}")
+    held = vector("history", history, -_LARGEST_HISTORY, _LARGEST_HISTORY, "kg^1/2 m")
+    if len(held) != n:
+        raise InvalidInput("history", f"{len(held)} numbers", f"give one number a mode: {n}")
+    revolutions = whole("revolutions", revolutions, 1, MOST_REVOLUTIONS)
     method = MethodOfSteps(problem.delay_equation(), state_weights(problem), rtol)
     before = Revolution.constant(method.first_mesh(), np.concatenate([held, np.zeros(n)]))
     found = []
@@ -140,13 +141,30 @@ def held_node(omega: np.ndarray, mode_shape: np.ndarray, displacement: float) ->
     Raises
     ------
     InvalidInput
-        When no mode moves the node.
+        When no mode moves the node, or numbers are missing or out of range.
     """
-    pushed = np.asarray(mode_shape, dtype=float) / np.asarray(omega, dtype=float) ** 2
-    give = float(pushed @ mode_shape)
+    natural = vector("omega", omega, 0.0, 2 * np.pi * FREQUENCY_LIMITS_HZ[1], "rad/s", open_low=True)
+    shape = vector("mode_shape", mode_shape, -AMPLITUDE_LIMIT, AMPLITUDE_LIMIT, "kg^-1/2")
+    if len(shape) != len(natural):
+        raise InvalidInput("mode_shape", f"{len(shape)} numbers", f"give one a mode: {len(natural)}")
+    displacement = number("displacement", displacement, -1e3, 1e3, "m")
+    pushed = shape / natural**2
+    give = float(pushed @ shape)
     if give == 0.0:
         raise InvalidInput("mode_shape", "all zero", "choose a node that the modes move")
     return pushed * (displacement / give)
+
+
+def check_problem(problem: Any) -> None:
+    """Refuse what is no rubbing blade.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    if not isinstance(problem, RubbingBlade):
+        remedy = "give a RubbingBlade, e.g. RubbingBlade.from_blade(blade, contact, speed_hz, ke)"
+        raise InvalidInput("problem", type(problem).__name__, remedy)
 
 
 def state_weights(problem: RubbingBlade) -> np.ndarray:

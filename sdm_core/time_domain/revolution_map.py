@@ -14,9 +14,12 @@ from sdm_core.time_domain.method_of_steps import RTOL, MethodOfSteps
 from sdm_core.time_domain.revolution import Revolution
 from sdm_core.time_domain.revolution_mesh import RevolutionMesh
 from sdm_core.time_domain.runge_kutta import ALL_STAGES, AT_NODES
+from sdm_core.validation import whole
 
 _SETTLING = 3  # revolutions whose errors choose the steps
 _SUBSPACE = 40
+_SMALL = 64  # below, the map is a matrix
+MOST_MODES = 100
 _RESTARTS = 400
 _ACCURACY = 1e-10  # of Arnoldi's method, relative
 
@@ -66,9 +69,12 @@ def leading_floquet_modes(
 
     Raises
     ------
+    InvalidInput
+        When `count` is out of range, or `rtol`, `weights` or `equation` are none.
     TooMuchWork
         When the method does not converge, or the tolerance takes too many steps.
     """
+    count, seed = whole("count", count, 1, MOST_MODES), whole("seed", seed, 0, 2**63)
     method = MethodOfSteps(equation, weights, rtol)
     coarse_map = RevolutionMap(method, _settled_mesh(method, seed))
     fine_map = RevolutionMap(method, coarse_map.mesh.cut(np.full(len(coarse_map.mesh.steps), 2)))
@@ -107,6 +113,11 @@ class RevolutionMap:
 
     def leading(self, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Eigenvalues of largest modulus, and their vectors as rows."""
+        if self.length <= _SMALL:
+            matrix = np.array([self(unit) for unit in np.eye(self.length)]).T
+            values, vectors = np.linalg.eig(matrix)
+            order = np.argsort(-np.abs(values))[: 2 * count + 2]
+            return values[order], vectors.T[order]
         wanted = min(2 * count + 2, self.length - 2)
         operator = LinearOperator((self.length, self.length), matvec=self, dtype=float)
         begin = np.random.default_rng(seed).normal(size=self.length)
@@ -114,7 +125,12 @@ class RevolutionMap:
         begin = self(self(begin))
         try:
             values, vectors = eigs(
-                operator, wanted, v0=begin, ncv=min(self.length, _SUBSPACE), maxiter=_RESTARTS, tol=_ACCURACY
+                operator,
+                wanted,
+                v0=begin,
+                ncv=min(self.length, max(_SUBSPACE, 2 * wanted)),
+                maxiter=_RESTARTS,
+                tol=_ACCURACY,
             )
         except ArpackNoConvergence as error:
             found = f"{len(error.eigenvalues)} of {wanted} multipliers after {_RESTARTS} restarts"

@@ -9,7 +9,7 @@ import numpy as np
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.time_domain.fitted_growth import chatter_frequency
 from sdm_core.time_domain.method_of_steps import RTOL
-from sdm_core.time_domain.motion import state_weights
+from sdm_core.time_domain.motion import check_problem, state_weights
 from sdm_core.time_domain.revolution_map import FloquetMode, leading_floquet_modes
 
 NEARLY_EQUAL = 1e-3
@@ -62,6 +62,7 @@ def time_witness(problem: RubbingBlade, rtol: float = RTOL) -> TimeWitness:
     >>> time_witness(problem).stable  # below 2ξ(1 + ξ)ω² it is stable at every speed
     True
     """
+    check_problem(problem)
     modes = leading_floquet_modes(
         problem.delay_equation(), _LISTED, weights=state_weights(problem), rtol=rtol
     )

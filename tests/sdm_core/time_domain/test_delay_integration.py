@@ -205,20 +205,58 @@ def test_a_force_at_a_node_holds_it_where_it_is_said_to_be():
     ("call", "field"),
     [
         (lambda p: integrated(p, np.array([1.0]), 3), "history"),
-        (lambda p: integrated(p, np.array([1.0, np.nan]), 3), "history"),
+        (lambda p: integrated(p, np.array([1.0, np.nan]), 3), "history[1]"),
+        (lambda p: integrated(p, ["a", 1.0], 3), "history[0]"),
+        (lambda p: integrated(p, [[1.0], [2.0, 3.0]], 3), "history[0]"),
+        (lambda p: integrated(p, [1e300, 0.0], 3), "history[0]"),
+        (lambda p: integrated(None, np.ones(2), 3), "problem"),
         (lambda p: integrated(p, np.ones(2), 0), "revolutions"),
         (lambda p: integrated(p, np.ones(2), 2.5), "revolutions"),
+        (lambda p: integrated(p, np.ones(2), True), "revolutions"),
+        (lambda p: integrated(p.with_ke(1e7), np.ones(2), 2000, rtol=1e-4), "revolutions"),
         (lambda p: integrated(p, np.ones(2), 3, rtol=1e-20), "rtol"),
+        (lambda p: integrated(p, np.ones(2), 3, rtol="x"), "rtol"),
         (lambda p: integrated(p, np.ones(2), 3).at(np.array([1.0])), "times[0]"),
+        (lambda p: integrated(p, np.ones(2), 3).at(["a"]), "times[0]"),
+        (lambda p: integrated(p, np.ones(2), 3).displacement([0.0], [[1.0]]), "mode_shape"),
+        (lambda p: integrated(p, np.ones(2), 3).displacement([0.0], [[np.nan], [1.0]]), "mode_shape[0][0]"),
         (lambda p: fitted_growth(integrated(p, np.ones(2), 3)), "revolutions"),
         (lambda p: fitted_growth(integrated(p, np.zeros(2), 8)), "motion"),
+        (lambda p: fitted_growth([1.0, 2.0]), "motion"),
         (lambda p: held_node(p.omega, np.zeros(2), 1e-3), "mode_shape"),
+        (lambda p: held_node(p.omega, np.ones(3), 1e-3), "mode_shape"),
+        (lambda p: held_node([0.0, 1.0], np.ones(2), 1e-3), "omega[0]"),
+        (lambda p: held_node(p.omega, np.ones(2), np.nan), "displacement"),
+        (lambda p: leading_floquet_modes(p), "equation"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), 0), "count"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), 2.5), "count"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), seed=-1), "seed"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), rtol=None), "rtol"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), weights=[1.0, 2.0]), "weights"),
+        (lambda p: leading_floquet_modes(p.delay_equation(), weights=[1.0, 2.0, 0.0, 1.0]), "weights[2]"),
+        (lambda p: time_witness(p.delay_equation()), "problem"),
     ],
 )
 def test_what_cannot_be_integrated_is_said(call, field):
     with pytest.raises(InvalidInput) as refused:
         call(two_modes())
     assert refused.value.field == field
+
+
+def test_without_cutting_the_multipliers_are_those_of_free_vibration():
+    problem = two_modes(ke=0.0)
+    root = problem.omega * np.sqrt(1 - problem.damping_ratio**2)
+    free = np.exp((-problem.damping_ratio * problem.omega + 1j * root) * problem.tau)
+    found = leading_floquet_modes(problem.delay_equation(), 5, weights=state_weights(problem))
+    assert sorted(abs(mode.multiplier) for mode in found) == pytest.approx(sorted(np.abs(free)), rel=1e-9)
+
+
+def test_as_many_multipliers_as_asked_for_are_found():
+    problem = two_modes(ARCS)
+    few, many = (leading_floquet_modes(problem.delay_equation(), count) for count in (2, 20))
+    assert len(many) == 20
+    for one, other in zip(few, many, strict=False):
+        assert one.multiplier == pytest.approx(other.multiplier, rel=1e-9)
 
 
 def test_a_revolution_of_too_many_vibrations_is_refused_before_it_is_begun():
