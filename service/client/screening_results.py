@@ -114,7 +114,7 @@ class ScreeningResults:
     job
         The screening's id.
     complete
-        False where the job is not over: ranks are of what was there.
+        False where the job is not over, or was cancelled or failed: ranks are of what was there.
     parquet
         The table as the service sent it.
     """

@@ -89,7 +89,10 @@ def results(
         found = client.screening_results(job, contact=contact, verdict=verdict, meets_criteria=criteria)
         show_results(client, found, json=json, csv=csv, parquet=parquet)
     if not found.rows:
-        typer.echo("rubscreen: no results fit, or none are there yet", err=True)
+        typer.echo(
+            "rubscreen: no results fit, or none are there: `rubscreen batch status ID` tells how far it is",
+            err=True,
+        )
 
 
 @app.command()

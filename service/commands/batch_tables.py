@@ -36,7 +36,7 @@ def show_results(
     if found.rows:
         console.print(ranking_table(found.rows))
     if not found.complete:
-        console.print("[dim]the job is not over: ranks are of what is there so far[/dim]")
+        console.print("[dim]not every blade of the job is there: ranks are of those that are[/dim]")
     lost = [(failure.source, failure.reason) for failure in failures]
     lost += [(as_typed(blade.source), blade.reason) for blade in found.not_screened]
     if lost:

@@ -61,7 +61,7 @@ def run(
     )
     from service.commands.tables import verification_table
     from service.screening.charts import described
-    from service.screening.sweep import cut_off, searched
+    from service.screening.sweep import cut_off, searched, through_tips
     from service.speeds import evenly_spaced
     from service.verification.comparison import compared
     from service.verification.points import chosen_points
@@ -100,6 +100,7 @@ def run(
     if png:
         from service.verification.picture import verification_png
 
-        write_bytes("--png", png, verification_png(chosen, described(contact), wide, ke_max, found))
+        line = through_tips(answerer, chosen, contact, wide, tips)
+        write_bytes("--png", png, verification_png(chosen, described(contact), line, ke_max, found))
     if agree < len(found) or wrong:
         raise typer.Exit(1)

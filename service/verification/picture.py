@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from sdm_core.blade import Blade
 from service.screening.print_sheet import DPI, as_png
@@ -18,6 +19,7 @@ _MARKS = {
     False: ("o", "black", "unstable"),
     None: ("s", "0.6", "not decided"),
 }
+_ENOUGH_FOR_A_LINE = 150
 _LEAST = 1e-16  # what is drawn for no difference at all
 
 
@@ -29,7 +31,17 @@ def verification_png(
     FigureCanvasAgg(figure)
     plane, differences = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     figure.suptitle(f"{blade.name}: {contact}", fontsize=11)
-    plane.plot(boundary.speed_hz, boundary.critical_ke, color="0.45", lw=0.9, label="exact boundary")
+    # Speeds asked about, and between them a line only where it can be followed: with arcs it cannot.
+    followed = len(boundary.speed_hz) >= _ENOUGH_FOR_A_LINE
+    plane.plot(
+        boundary.speed_hz,
+        boundary.critical_ke,
+        color="0.45",
+        lw=0.9 if followed else 0.0,
+        marker=None if followed else ".",
+        ms=4,
+        label="exact boundary" if followed else "exact boundary at the speeds asked about",
+    )
     for verdict, (mark, fill, name) in _MARKS.items():
         of = [v for v in found if v.exact is verdict]
         if of:
@@ -60,7 +72,8 @@ def verification_png(
                 label=label,
             )
     plane.set_ylim(0.0, ke_max)
-    plane.set_xlim(boundary.speed_hz.min(), boundary.speed_hz.max())
+    low, high = boundary.speed_hz.min(), boundary.speed_hz.max()
+    plane.set_xlim(low - 0.01 * (high - low), high + 0.01 * (high - low))
     plane.set_xlabel(r"rotor speed $\Omega$ [Hz]")
     plane.set_ylabel(r"$K_e$ [N/m]")
     plane.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=9, frameon=False)
@@ -78,6 +91,7 @@ def verification_png(
         )
     differences.axhline(RADIUS_AGREES, color="#c8501e", lw=1.0, ls="--", label="agreement asked for")
     differences.set_yscale("log")
+    differences.xaxis.set_major_locator(MaxNLocator(5))
     differences.set_ylim(_LEAST / 3, 10 * RADIUS_AGREES)
     differences.set_xlabel(r"growth per revolution $\ln|\mu|$ [-]")
     differences.set_ylabel(r"relative difference of $|\mu|$ [-]")

@@ -133,7 +133,11 @@ class AbradableLiner:
         contact_length_m: float = 1e-3,
     ) -> AbradableLiner:
         """The liner that is cut with a stiffness K_e, N/m, of which a share ε = E_T/E springs back."""
-        ke = number("ke", ke, 0.0, 1e15, "N/m", open_low=True)
+        ke = number("ke", ke, 0.0, 1e9, "N/m", open_low=True)
+        yield_force_n = number("yield_force_n", yield_force_n, 0.0, 1e9, "N")
+        thickness_m = _length("thickness_m", thickness_m)
+        axial_width_m = _length("axial_width_m", axial_width_m)
+        contact_length_m = _length("contact_length_m", contact_length_m)
         recovery = number("elastic_recovery", elastic_recovery, 0.0, 0.999, "", open_low=True)
         section = axial_width_m * contact_length_m
         tangent = ke * thickness_m / section
@@ -184,7 +188,7 @@ class AbradableLiner:
         return np.broadcast_to(width, nodes).copy()
 
     def bars(self, nodes: int, cell_length_m: float | None = None) -> Bars:
-        """Bars under `nodes` contact nodes.
+        """Bars under `nodes` contact nodes, 1 or more.
 
         Parameters
         ----------
@@ -233,7 +237,7 @@ class Friction:
     def __post_init__(self) -> None:
         checked = number("friction.coefficient", self.coefficient, 0.0, 10.0, "")
         object.__setattr__(self, "coefficient", checked)
-        if self.rotation not in (1, -1):
+        if type(self.rotation) is not int or self.rotation not in (1, -1):
             raise InvalidInput(
                 "friction.rotation", self.rotation, "give 1 (towards positive tangential) or -1"
             )

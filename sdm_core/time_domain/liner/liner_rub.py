@@ -51,7 +51,15 @@ class LinerRub:
         if not isinstance(self.blade, Blade):
             raise InvalidInput("blade", type(self.blade).__name__, "give a Blade, e.g. read_blade(path)")
         if not isinstance(self.nodes, list | tuple) or len(self.nodes) == 0:
-            raise InvalidInput("nodes", self.nodes, "name at least one tip node that can touch")
+            remedy = f"give a list of tip nodes that can touch, e.g. [{self.blade.tip_nodes[0]!r}]"
+            raise InvalidInput("nodes", self.nodes, remedy)
+        for name, kind in (("liner", AbradableLiner), ("casing", Casing)):
+            given = getattr(self, name)
+            if not isinstance(given, kind):
+                raise InvalidInput(name, type(given).__name__, f"give {_a(kind.__name__)}")
+        if not isinstance(self.friction, Friction | None):
+            remedy = "give a Friction(coefficient, rotation), or None"
+            raise InvalidInput("friction", self.friction, remedy)
         object.__setattr__(self, "nodes", tuple(self.nodes))
         for i, node in enumerate(self.nodes):
             if node not in self.blade.tip_nodes or node in self.nodes[:i]:
@@ -92,7 +100,8 @@ class InitialMotion:
     def checked(self, modes: int) -> tuple[np.ndarray, np.ndarray]:
         """Both, of `modes` numbers; an empty velocity is zero."""
         put = vector("initial.displacement", self.displacement, -1e6, 1e6, "kg^1/2 m")
-        moving: Any = self.velocity if len(self.velocity) else np.zeros(modes)
+        still = hasattr(self.velocity, "__len__") and len(self.velocity) == 0
+        moving: Any = np.zeros(modes) if still else self.velocity
         pushed = vector("initial.velocity", moving, -1e9, 1e9, "kg^1/2 m/s")
         for name, values in (("displacement", put), ("velocity", pushed)):
             if len(values) != modes:
@@ -100,3 +109,7 @@ class InitialMotion:
                     f"initial.{name}", f"{len(values)} numbers", f"give one number a mode: {modes}"
                 )
         return put, pushed
+
+
+def _a(name: str) -> str:
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"

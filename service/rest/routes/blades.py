@@ -11,12 +11,13 @@ from service.rest.access import READ
 from service.rest.blade_question import BladeQuestion
 from service.rest.blade_reply import built_reply, checked_reply
 from service.rest.body import parsed
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.openapi import problems, request_body
 from service.rest.profile_schema import BLADES_EXAMPLE
 from service.rest.routes.request import TheJson, the_desk
 from service.rest.schemas import BladeReply
 
-router = APIRouter(prefix="/v1", tags=["blades"], dependencies=[READ])
+router = APIRouter(prefix="/v1", tags=["blades"], dependencies=[READ, KNOWN_QUERY])
 
 
 @router.post(

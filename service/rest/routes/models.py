@@ -14,6 +14,7 @@ from service.rest.access import ADMIN, READ
 from service.rest.body import parsed
 from service.rest.desk import Desk
 from service.rest.errors import ModelNotChanged, NoSuchModel, PromotionNotAllowed
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.model_schemas import Activation, ModelChange, ModelHistory, PromotionQuestion
 from service.rest.models_folder import models_folder
 from service.rest.openapi import problems, request_body
@@ -23,7 +24,7 @@ from service.rest.schemas import Model, Models
 from training import activation, promotion
 from training.registry import SHIPPED, is_model, model_entry
 
-router = APIRouter(prefix="/v1", tags=["models"], dependencies=[READ])
+router = APIRouter(prefix="/v1", tags=["models"], dependencies=[READ, KNOWN_QUERY])
 
 
 @router.get("/models", responses=problems(500))

@@ -11,6 +11,7 @@ from service.rest import replies
 from service.rest.access import READ
 from service.rest.forms.media_types import ARROW, BULK, BYTES, JSON, NPZ, PNG
 from service.rest.forms.npz_replies import points_to_npz, sensitivities_to_npz
+from service.rest.known_query import KNOWN_QUERY
 from service.rest.negotiation import best_form, form_or_first
 from service.rest.openapi import problems, request_body
 from service.rest.question_schemas import (
@@ -29,7 +30,7 @@ MAP_FORMS = (JSON, NPZ, BYTES, PNG)
 VARY = {"Vary": "Accept"}
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
-router = APIRouter(prefix="/v1", tags=["stability"], dependencies=[READ])
+router = APIRouter(prefix="/v1", tags=["stability"], dependencies=[READ, KNOWN_QUERY])
 
 
 @router.post(
