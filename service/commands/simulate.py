@@ -48,14 +48,15 @@ def run(
         Number, _option("--friction", "MU", "Coulomb friction of the tip; left out: none.", CONTACT)
     ] = None,
     rotation: Annotated[
-        int,
+        int | None,
         typer.Option(
             metavar="1|-1",
-            help="With --friction: 1 where the blade turns towards positive tangential, -1 where it turns "
-            "the other way.",
+            help="With --friction, and needed then: 1 where the blade turns towards positive tangential, -1 "
+            "where it turns the other way.",
             rich_help_panel=CONTACT,
+            show_default=False,
         ),
-    ] = 1,
+    ] = None,
     ke_liner: Annotated[
         Number,
         _option(

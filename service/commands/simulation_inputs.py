@@ -78,12 +78,15 @@ def casing_from(clearance: str | None, **given: float | None) -> CasingConstants
     return CasingConstants.from_dict(typed)
 
 
-def friction_from(coefficient: float | None, rotation: int) -> Friction | None:
+def friction_from(coefficient: float | None, rotation: int | None) -> Friction | None:
     """Friction as typed; none without a coefficient."""
     if coefficient is None:
-        if rotation != 1:
+        if rotation is not None:
             raise InvalidInput("--rotation", rotation, "give --friction too, or leave it out")
         return None
+    if rotation is None:
+        remedy = "give 1 where the blade turns towards positive tangential, else -1: no blade file tells"
+        raise InvalidInput("--rotation", "left out", remedy)
     return Friction(coefficient, rotation)
 
 

@@ -39,6 +39,8 @@ def _figure(
         notes=(
             ASSUMED,
             "the casing is nearest at 0 and half a turn; both maps of a blade have one scale of grey",
+            "two casing lobes excite even engine orders alone: wear is deep where one of them meets a "
+            "natural frequency, and follows the yield force of the liner more than K_e (decision 23)",
             *_through(wear),
         ),
         ratio=wear.speed_ratio,

@@ -119,14 +119,14 @@ FRICTION: Json = {
     "oneOf": [
         {
             "type": "object",
-            "required": ["coefficient"],
+            "required": ["coefficient", "rotation"],
             "additionalProperties": False,
             "properties": {
                 "coefficient": {"type": "number", "minimum": 0, "maximum": 10},
                 "rotation": {
                     "enum": [1, -1],
-                    "default": 1,
-                    "description": "1 where the blade turns towards its positive tangential direction.",
+                    "description": "1 where the blade turns towards its positive tangential direction, -1 "
+                    "where it turns the other way: no blade file tells, and it decides what friction does.",
                 },
             },
         },
@@ -183,12 +183,8 @@ def _casing(value: Any, info: ValidationInfo) -> CasingConstants:
 def _friction(value: Any) -> Friction | None:
     if value is None:
         return None
-    if (
-        not isinstance(value, dict)
-        or "coefficient" not in value
-        or value.keys() - {"coefficient", "rotation"}
-    ):
-        raise InvalidInput("friction", value, "give an object with coefficient, and perhaps rotation")
+    if not isinstance(value, dict) or value.keys() != {"coefficient", "rotation"}:
+        raise InvalidInput("friction", value, "give an object with coefficient and rotation (1 or -1)")
     return Friction(**value)
 
 

@@ -13,11 +13,13 @@ from sdm_core.contact import ContactConfiguration
 from sdm_core.rubbing_blade import RubbingBlade
 from sdm_core.semi_discretization import Averaged
 from service.paper_figures import fixed_steps, rubbing, study, time_convergence
+from service.paper_figures.all_figures import BladeFigures
 from service.paper_figures.bending_and_torsion import bending_and_torsion
 from service.paper_figures.centrifugal_stiffening import centrifugal_stiffening
 from service.paper_figures.contact_location import contact_location, flexibility
 from service.paper_figures.fixed_steps import fixed_step_lobes, unstable_intervals
 from service.paper_figures.lobes import Lobes, exact_lobes
+from service.paper_figures.markdown_page import markdown_page
 from service.paper_figures.modal_convergence import modal_convergence
 from service.paper_figures.outline import outlines
 from service.paper_figures.paper_figure import Claim, PaperFigure
@@ -283,20 +285,26 @@ def test_the_command_writes_every_figure_a_page_and_the_numbers(rubscreen, narro
             assert figure[line].replace("K_e", "K<sub>e</sub>").replace("'", "&#x27;") in page
 
 
-def test_the_documentation_page_names_every_picture_and_every_verdict(
-    rubscreen, narrow, monkeypatch, tmp_path
-):
-    monkeypatch.setattr(study, "LOWEST_RATIO", 0.30)
-    monkeypatch.setattr(time_convergence, "_EVEN_SPEEDS", 10)
-    monkeypatch.setattr(rubbing, "SPEEDS", 3)
-    monkeypatch.setattr(rubbing, "REVOLUTIONS", 20)
-    assert rubscreen("paper", "--markdown", "--out", str(tmp_path)).exit_code == 0
-    page = (tmp_path / "index.md").read_text()
-    document = json.loads((tmp_path / "figures.json").read_text())
-    assert sorted(re.findall(r"!\[.*\]\((.*)\)", page)) == sorted(f["picture"] for f in document["figures"])
-    for figure in document["figures"]:
-        for one in figure["claims"]:
-            assert f"**{one['verdict'].capitalize()}**" in page
+def test_the_documentation_page_names_every_picture_and_verdict():
+    claims = (
+        Claim("a | b", "1 < 2", True),
+        Claim("K_e* counts", "it does not", False),
+        Claim("c", "d", None),
+    )
+    figures = tuple(
+        PaperFigure(number=number, title=f"title {number}", blade="made", claims=claims, notes=("noted",))
+        for number in (5, 14)
+    )
+    blades = [BladeFigures(studied(blade_of()), ("about it",), figures)]
+    page = markdown_page(blades, [["five.png", "fourteen.png"]], "rubscreen paper")
+    assert re.findall(r"!\[.*\]\((.*)\)", page) == ["five.png", "fourteen.png"]
+    for verdict in ("Agrees", "Differs", "Cannot be compared"):
+        assert page.count(f"**{verdict}**") == len(figures)
+    rows = [line for line in page.splitlines() if line.startswith("| Fig.")]
+    assert len(rows) == len(figures) * len(claims)
+    # A bar in a statement is no column, a star no emphasis, a sign of less no tag.
+    assert all(len(re.findall(r"(?<!\\)\|", row)) == 4 for row in rows)
+    assert r"K\_e\* counts" in page and r"1 \< 2" in page
 
 
 def test_the_main_lobes_of_a_profile_are_its_strongest_harmonic():

@@ -103,9 +103,10 @@ def test_a_liner_worn_through_is_shown_and_ends_with_status_1(tmp_path):
         (["--revolutions", "0"], "--revolutions = 0", "from 1"),
         (["--threads", "0"], "--threads = 0", "from 1 up"),
         (["--nodes", "LE,XX"], "XX", "LE"),
-        (["--friction", "-0.1"], "--friction = -0.1", "from 0"),
+        (["--friction", "-0.1", "--rotation", "1"], "--friction = -0.1", "from 0"),
         (["--friction", "0.1", "--rotation", "2"], "--rotation = 2", "give 1"),
         (["--rotation", "-1"], "--rotation = -1", "give --friction too"),
+        (["--friction", "0.1"], "--rotation = left out", "no blade file tells"),
     ],
 )
 def test_bad_input_is_one_line_that_names_option_value_and_remedy(options, named, remedy):
@@ -125,7 +126,8 @@ def test_friction_is_refused_for_a_blade_without_tangential_shapes(tmp_path):
         del state["mode_shape_tangential"]
     path = tmp_path / "blade.json"
     path.write_text(json.dumps(document))
-    options = ["simulate", str(path), *QUICK, "--speed", "250Hz", "--friction", "0.1"]
+    friction = ["--friction", "0.1", "--rotation", "1"]
+    options = ["simulate", str(path), *QUICK, "--speed", "250Hz", *friction]
     done = CliRunner().invoke(cli.app, options)
     assert done.exit_code == 2
     assert "--friction" in done.stderr and "tangential mode shapes" in done.stderr

@@ -222,11 +222,13 @@ class Friction:
     coefficient
         μ.
     rotation
-        1 where the blade turns towards its positive tangential direction, −1 where it turns the other way.
+        1 where the blade turns towards its positive tangential direction, −1 where it turns the other way. A
+        blade file does not tell, and it decides whether friction lowers or raises the critical K_e
+        (decision 27), so that it has to be said; NASA rotor 37 takes −1.
     """
 
     coefficient: float
-    rotation: int = 1
+    rotation: int
 
     def __post_init__(self) -> None:
         checked = number("friction.coefficient", self.coefficient, 0.0, 10.0, "")

@@ -55,7 +55,7 @@ def test_contact_before_anything_moves_is_refused_unless_said_on_purpose(clearan
 
 def test_friction_asks_for_tangential_shapes():
     with pytest.raises(InvalidInput, match=r"without mode_shape_tangential.*leave friction out"):
-        LinerRub(one_mode(), ("tip",), SOFT, Casing(0.25, 1e-4), Friction(0.1))
+        LinerRub(one_mode(), ("tip",), SOFT, Casing(0.25, 1e-4), Friction(0.1, 1))
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_friction_asks_for_tangential_shapes():
         ("lobes", lambda: Casing(0.25, 1e-4, lobes=0)),
         ("radius_m", lambda: Casing(0.0, 1e-4)),
         ("feed_per_revolution_m", lambda: Casing(0.25, 1e-4, feed_per_revolution_m=-1e-6)),
-        ("friction.coefficient", lambda: Friction(-0.1)),
+        ("friction.coefficient", lambda: Friction(-0.1, 1)),
         ("friction.rotation", lambda: Friction(0.1, 0)),
         ("cells", lambda: CentralDifferences(cells=3)),
         ("steps_per_cell", lambda: CentralDifferences(steps_per_cell=0)),

@@ -27,7 +27,7 @@ NAMED_RUBS = {
     "leading edge": rotor_37(),
     "nothing to yield at": rotor_37(yield_force_n=0.0),
     "three nodes": rotor_37(EDGES_AND_MIDDLE),
-    "three nodes with friction": rotor_37(EDGES_AND_MIDDLE, friction=Friction(0.2)),
+    "three nodes with friction": rotor_37(EDGES_AND_MIDDLE, friction=Friction(0.2, 1)),
     "stiff liner": rotor_37(EDGES_AND_MIDDLE, ke=1e6, elastic_recovery=0.3),
     "hardening that accumulates": replace(
         rotor_37(), liner=replace(rotor_37().liner, hardening_restarts=False)
@@ -93,7 +93,7 @@ def test_any_rub_conserves_energy_and_material(ke, recovery, strength, feed, ova
         tuple(sorted(nodes)),
         AbradableLiner.from_cutting_stiffness(ke, elastic_recovery=recovery, yield_force_n=strength),
         Casing(0.25, 5e-5, oval, 2, 3.0, feed),
-        None if mu is None else Friction(mu),
+        None if mu is None else Friction(mu, 1),
     )
     found = run_revolutions(rub, speed, 6, CentralDifferences(200))
     assert found.force_n.min() >= 0
@@ -159,7 +159,7 @@ def test_two_nodes_that_move_as_one_are_one_node_of_twice_the_width():
 
 
 def test_neither_the_sign_of_a_mode_nor_the_order_of_the_nodes_matters():
-    rub = rotor_37(EDGES_AND_MIDDLE, friction=Friction(0.2))
+    rub = rotor_37(EDGES_AND_MIDDLE, friction=Friction(0.2, 1))
     turned = [s.reordered(np.arange(5), np.array([1.0, -1.0, 1.0, -1.0, -1.0])) for s in rub.blade.states]
     other = replace(
         rub, blade=replace(rub.blade, states=tuple(turned)), nodes=tuple(reversed(EDGES_AND_MIDDLE))
@@ -225,7 +225,7 @@ def test_friction_between_bending_and_contact_moves_the_boundary():
             ("tip",),
             AbradableLiner.from_cutting_stiffness(1e3, elastic_recovery=0.01),
             Casing(0.25, 0.0, feed_per_revolution_m=1e-6),
-            Friction(0.3),
+            Friction(0.3, 1),
         )
         found = simulate_rub(
             rub, 100.0 / 2.77, 40, CentralDifferences(4000, 1), initial=InitialMotion([3e-8])

@@ -198,9 +198,15 @@ def changed(**fields) -> dict:
         ),
         (changed(casing={"lobes": 1.5}), 422, "casing.lobes", "1.5", "whole number"),
         (changed(casing=[]), 422, "casing", "[]", "give an object"),
-        (changed(friction={"coefficient": -0.1}), 422, "friction.coefficient", "-0.1", "from 0"),
         (
-            changed(friction={"coefficient": 0.1}, blade=POINTS_EXAMPLE["blade"]),
+            changed(friction={"coefficient": -0.1, "rotation": 1}),
+            422,
+            "friction.coefficient",
+            "-0.1",
+            "from 0",
+        ),
+        (
+            changed(friction={"coefficient": 0.1, "rotation": 1}, blade=POINTS_EXAMPLE["blade"]),
             422,
             "friction",
             "nasa",
