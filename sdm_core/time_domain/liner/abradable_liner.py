@@ -233,7 +233,7 @@ class Friction:
     def __post_init__(self) -> None:
         checked = number("friction.coefficient", self.coefficient, 0.0, 10.0, "")
         object.__setattr__(self, "coefficient", checked)
-        if self.rotation not in (1, -1):
+        if isinstance(self.rotation, bool) or self.rotation not in (1, -1):
             raise InvalidInput(
                 "friction.rotation", self.rotation, "give 1 (towards positive tangential) or -1"
             )
