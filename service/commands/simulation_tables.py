@@ -27,7 +27,7 @@ def simulation_lines(outcome: SimulationOutcome) -> Iterator[str | Table]:
         thickness = order.liner.thickness_m * 1e3
         where = ", ".join(f"{hz:.5g}" for hz in found.speed_hz[found.worn_through][:8])
         yield f"the liner of {thickness:g} mm was worn through, and the simulation stopped, at {where} Hz"
-    share = float((found.cell_damping_ratio / order.blade.damping_ratio).max())
+    share = float((found.cell_damping_ratio / np.maximum(order.blade.damping_ratio, 1e-12)).max())
     if share > _NOTICED:
         yield (
             f"cells this long add up to {share:.0%} to the damping of a mode in kept contact: "

@@ -20,6 +20,7 @@ from service.simulation.response import Response
 from service.simulation.simulated_speeds import SimulatedSpeeds, npz_arrays, npz_bytes
 
 Progress = Callable[[int, int], None]
+_NEXT_TO = 2e-6  # relative: speeds with no range between them
 
 
 @dataclass(frozen=True)
@@ -156,9 +157,9 @@ def each_speed(
 
 def unstable_lobes(order: SimulationOrder) -> np.ndarray:
     """Intervals of speed at which permanent contact with the liner is unstable, Hz, shape (l, 2)."""
-    if order.single:
-        return np.zeros((0, 2))
     reach = (order.speed_hz[0], order.speed_hz[-1])
+    if reach[0] >= reach[1] * (1 - _NEXT_TO):
+        return np.zeros((0, 2))
     ke = order.ke_without_recovery
     tips = least_critical_ke(order.blade, order.contact, *reach, ke)
     deep = [tip.speed_hz for tip in tips]

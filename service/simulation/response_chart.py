@@ -94,7 +94,8 @@ def _account(axes: Axes, response: Response) -> None:
         if np.any(values):
             axes.plot(at, values * 1e3, color=colour, ls=dash, lw=1.2, label=label)
     axes.set_ylabel("energy account [mJ]")
-    axes.legend(fontsize=8, frameon=False, loc="upper left")
+    if axes.get_lines():
+        axes.legend(fontsize=8, frameon=False, loc="upper left")
 
 
 def _modal(axes: Axes, order: SimulationOrder, response: Response, turns: np.ndarray, part: slice) -> None:
@@ -103,8 +104,9 @@ def _modal(axes: Axes, order: SimulationOrder, response: Response, turns: np.nda
     strongest = np.argsort(energy.mean(axis=0))[::-1][: len(STYLES)]
     for (colour, dash), mode in zip(STYLES, sorted(strongest.tolist()), strict=False):
         axes.plot(turns[part], energy[:, mode], color=colour, ls=dash, lw=0.9, label=f"mode {mode + 1}")
-    axes.set_yscale("log")
-    top = max(float(energy.max()), 1e-12)
-    axes.set_ylim(top * 1e-4, top * 20)
+    top = float(energy.max())
+    if top > 0:
+        axes.set_yscale("log")
+        axes.set_ylim(top * 1e-4, top * 20)
     axes.set_ylabel("energy by mode [mJ]")
     axes.legend(fontsize=8, frameon=False, ncols=2, loc="upper left")

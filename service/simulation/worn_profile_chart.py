@@ -82,9 +82,10 @@ def _harmonics(axes: Axes, outcome: SimulationOutcome) -> None:
             chatter, color=UNSTABLE, lw=1.1, ls="--", label=f"{what} by the exact core, {chatter:.1f} Ω"
         )
         axes.legend(fontsize=8, frameon=False, loc="upper right")
-    axes.set_yscale("log")
-    top = max(2e6 * float(found.worn_m.max()), 1e-6)
-    axes.set_ylim(top * 1e-4, top)
+    top = 2e6 * float(found.worn_m.max())
+    if top > 0:
+        axes.set_yscale("log")
+        axes.set_ylim(top * 1e-4, top)
     axes.set_xlim(0, most + 1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     axes.set_xlabel("lobes round the casing [-]")
