@@ -7,7 +7,6 @@ one order higher each revolution), and where the coefficients jump: at the edges
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,8 +27,6 @@ TIGHTEST, LOOSEST = 1e-13, 1e-2
 MOST_STEPS = 400_000
 _FIRST_STEP = 1.0  # radians of the fastest free motion
 _MOST_PARTS, _SAFETY, _MOST_TRIES = 8, 1.2, 30
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -77,13 +74,6 @@ class MethodOfSteps:
             size = max(size, np.abs(np.linalg.eigvals(coefficients.constant + reach * matrix)).max())
         longest = self.equation.tau if size == 0 else min(self.equation.tau, _FIRST_STEP / size)
         return self._within_reason(RevolutionMesh.uniform(self.equation.pieces, longest))
-
-    def revolutions(self, history: Revolution) -> Iterator[Revolution]:
-        """Revolution after revolution, from the one before t = 0; there is no end to them."""
-        before = history
-        while True:
-            before = self.next_revolution(before)
-            yield before
 
     def next_revolution(self, before: Revolution, start: np.ndarray | None = None) -> Revolution:
         """The revolution after `before`, on its steps or, where the error asks for it, on shorter ones.

@@ -48,17 +48,5 @@ def dense_basis(place: np.ndarray) -> np.ndarray:
     return out
 
 
-def dense_slope_basis(place: np.ndarray) -> np.ndarray:
-    """Derivatives of `dense_basis` by the place, shape (places, 7)."""
-    x = np.asarray(place, dtype=float)
-    out = np.empty((*x.shape, TERMS))
-    value, slope = np.ones_like(x), np.zeros_like(x)
-    for i in range(TERMS):
-        factor, sign = (x, 1.0) if i % 2 == 0 else (1 - x, -1.0)
-        value, slope = value * factor, slope * factor + sign * value
-        out[..., i] = slope
-    return out
-
-
 AT_NODES = dense_basis(NODES)
 """`dense_basis` where the next revolution's slopes are taken, shape (16, 7)."""

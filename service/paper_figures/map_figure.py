@@ -36,7 +36,7 @@ class MapFigure(PaperFigure):
     height_name, shade_name
         Of the axes.
     darkest
-        What is black; the lightest is `lightest`, by default 0.
+        What is black; white is 0, or `decades` below.
     decades
         0 shades evenly, else so many decades below `darkest`.
     lines

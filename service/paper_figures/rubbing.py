@@ -9,12 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from sdm_core.blade import Blade
-from sdm_core.time_domain.liner.abradable_liner import AbradableLiner
-from sdm_core.time_domain.liner.casing import Casing
 from sdm_core.time_domain.liner.central_differences import CentralDifferences
 from sdm_core.time_domain.liner.simulation import LinerRub
 from sdm_core.time_domain.liner.speed_sweep import SpeedSweep, sweep_speeds
 from service.paper_figures.study import Study
+from service.simulation.constants import USUAL_KE, CasingConstants, LinerConstants
 
 REVOLUTIONS = 50
 """[SBL] 5.1."""
@@ -22,12 +21,8 @@ SPEEDS, CELLS, ANGLES, LINES = 200, 4000, 500, 801
 HIGHEST_FREQUENCY = 6.0
 """Of the spectra, over f₁; [SBL] Fig. 14 sees nothing above 5."""
 
-# [SBL] gives none of these. E and σ_Y are of the order of a sprayed metal abradable; a tip 1 mm thick whose
-# edge node bears on a ninth of a chord of 30 mm; a casing that grows oval by 0.2 mm in five revolutions.
-KE = 1e4
-_YOUNGS_MODULUS_PA, _YIELD_STRESS_PA, _THICKNESS_M = 1.8e9, 15e6, 5e-3
-_CONTACT_LENGTH_M, _AXIAL_WIDTH_M = 1e-3, 3.4e-3
-_OVALISATION_M, _CLEARANCE_M, _OVALISATION_REVOLUTIONS = 2e-4, 1e-4, 5.0
+KE = USUAL_KE
+# [SBL] gives none of these: they are what `rubscreen simulate` takes where nothing is said.
 ASSUMED = (
     f"assumed, for the paper gives none: K_e = {KE:,.0f} N/m, E = 1.8 GPa, σ_Y = 15 MPa, liner 5 mm thick, "
     "3.4 mm² under a node, two casing lobes of 0.2 mm grown in five revolutions, 0.1 mm of clearance"
@@ -42,7 +37,6 @@ class Rubs:
 
     study: Study
     done: Done = lambda: None
-    speeds: int | None = None
 
     @cached_property
     def leading_edge(self) -> SpeedSweep:
@@ -62,7 +56,7 @@ class Rubs:
     def _swept(self, nodes: tuple[str, ...]) -> SpeedSweep:
         blade = self.study.blade
         f1 = self.study.first_frequency_hz
-        speed = np.linspace(*self.study.ratios, SPEEDS if self.speeds is None else self.speeds) * f1
+        speed = np.linspace(*self.study.ratios, SPEEDS) * f1
         return sweep_speeds(
             rub(blade, nodes),
             speed,
@@ -76,17 +70,4 @@ class Rubs:
 
 def rub(blade: Blade, nodes: tuple[str, ...], ke: float = KE) -> LinerRub:
     """One blade in the oval casing."""
-    assert blade.tip_radius_m is not None
-    section = _CONTACT_LENGTH_M * _AXIAL_WIDTH_M
-    tangent = ke * _THICKNESS_M / section
-    liner = AbradableLiner(
-        _YOUNGS_MODULUS_PA,
-        _YIELD_STRESS_PA,
-        tangent / (1 - tangent / _YOUNGS_MODULUS_PA),
-        _THICKNESS_M,
-        _AXIAL_WIDTH_M,
-        _CONTACT_LENGTH_M,
-    )
-    radius = max(blade.tip_radius_m) + _CLEARANCE_M
-    casing = Casing(radius, _CLEARANCE_M, _OVALISATION_M, 2, _OVALISATION_REVOLUTIONS)
-    return LinerRub(blade, nodes, liner, casing)
+    return LinerRub(blade, nodes, LinerConstants(ke).liner(), CasingConstants().casing(blade))

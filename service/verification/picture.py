@@ -53,7 +53,7 @@ def verification_png(
                 mfc=fill,
                 mec="black",
                 ms=5.5,
-                label=f"{name}, exact core and integration agree",
+                label=f"{name}, by the exact core",
             )
     for wrong, mark, size, label in (
         ([v for v in found if not v.agrees], "x", 13, "they differ"),
