@@ -20,11 +20,14 @@ from service.operation.desk_metrics import DeskMetrics
 from service.operation.draining import Draining
 from service.operation.metrics import Metrics
 from service.operation.tracing import Tracing
+from service.page import mounting as page
 from service.rest import access_log, errors, gate, openapi
 from service.rest.desk import Desk
 from service.rest.readiness import Readiness
 from service.rest.routes import (
+    assessments,
     blades,
+    examples,
     health,
     metrics,
     models,
@@ -110,7 +113,9 @@ def create_app(
         **({} if tracing is None else {"telemetry": tracing.for_fastapi()}),
     )
     app.include_router(stability.router)
+    app.include_router(assessments.router)
     app.include_router(blades.router)
+    app.include_router(examples.router)
     app.include_router(models.router)
     app.include_router(screenings.router)
     app.include_router(simulations.router)
@@ -118,6 +123,7 @@ def create_app(
     app.include_router(trainings.router)
     app.include_router(health.router)
     app.include_router(metrics.router)
+    page.install(app)
     errors.install(app)
     openapi.install(app)
     app.add_middleware(gate.Gate)

@@ -17,7 +17,9 @@ from service.roles import Role
 # They tell nothing that is worth a key, and a probe has none.
 HEALTH_PATHS = frozenset({"/healthz", "/readyz"})
 DOCUMENT_PATHS = frozenset({"/docs", "/docs/oauth2-redirect", "/openapi.json"})
-_ASSETS = "/docs/assets/"
+# Plain files that anybody may have: what the page shows, it asks for with the key of whoever looks.
+PAGE_PATHS = frozenset({"/", "/page"})
+_ASSETS = ("/docs/assets/", "/page/")
 
 HOW_TO_SEND = "`Authorization: Bearer KEY` or `X-API-Key: KEY`"
 
@@ -96,14 +98,14 @@ def the_caller(request: Request) -> Caller:
 
 
 def is_open(path: str) -> bool:
-    """Whether a path needs no key: health and documentation.
+    """Whether a path needs no key: health, documentation, and the files of the chart page.
 
     Examples
     --------
     >>> is_open("/healthz"), is_open("/v1/models"), is_open("/docs/assets/../../v1/models")
     (True, False, False)
     """
-    if path in HEALTH_PATHS or path in DOCUMENT_PATHS:
+    if path in HEALTH_PATHS or path in DOCUMENT_PATHS or path in PAGE_PATHS:
         return True
     return path.startswith(_ASSETS) and ".." not in path
 

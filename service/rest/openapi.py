@@ -16,6 +16,7 @@ from pydantic.json_schema import models_json_schema
 
 from sdm_core.version import __version__
 from service.rest.access import guarded_routes, needed
+from service.rest.assessment_questions import CampbellQuestion, DampingQuestion, LobesQuestion
 from service.rest.blade_question import BladeQuestion
 from service.rest.errors import PROBLEM_JSON
 from service.rest.forms.media_types import ARROW, NPZ
@@ -134,6 +135,9 @@ def _components() -> Json:
         BoundaryQuestion,
         SensitivitiesQuestion,
         MapQuestion,
+        CampbellQuestion,
+        LobesQuestion,
+        DampingQuestion,
         BladeQuestion,
         ScreeningQuestion,
         SimulationQuestion,

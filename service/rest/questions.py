@@ -48,7 +48,8 @@ def the_blade(value: Any, info: ValidationInfo) -> Blade:
         raise error.under("blade") from None
 
 
-def _contact(value: Any, info: ValidationInfo) -> ContactConfiguration:
+def the_contact(value: Any, info: ValidationInfo) -> ContactConfiguration:
+    """A contact within the limits."""
     if isinstance(value, dict):
         check_length(
             "contact.weights", value.get("weights"), settings_of(info).max_tip_nodes, "name fewer nodes"
@@ -72,7 +73,8 @@ def _ke(value: Any, info: ValidationInfo) -> np.ndarray:
     return stiffnesses("ke", value)
 
 
-def _ke_max(value: Any) -> float:
+def the_ke_max(value: Any) -> float:
+    """The largest stiffness to look at, N/m."""
     return number("ke_max", value, 0.0, KE_LIMIT, "N/m", open_low=True)
 
 
@@ -105,7 +107,7 @@ class Question(BaseModel, ABC):
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
     blade: Annotated[Blade, PlainValidator(the_blade), WithJsonSchema(BLADE)]
-    contact: Annotated[ContactConfiguration, PlainValidator(_contact), WithJsonSchema(CONTACT)]
+    contact: Annotated[ContactConfiguration, PlainValidator(the_contact), WithJsonSchema(CONTACT)]
     speed_hz: SpeedArray
     policy: Annotated[str, PlainValidator(checked_policy), WithJsonSchema(POLICY)] = "auto"
     alpha: Annotated[float | None, PlainValidator(checked_alpha), WithJsonSchema(ALPHA)] = None
@@ -159,7 +161,7 @@ class BoundaryQuestion(Question):
     """From which stiffness on is the blade unstable at these speeds?"""
 
     speed_hz: BoundarySpeedArray
-    ke_max: Annotated[float, PlainValidator(_ke_max), WithJsonSchema(KE_MAX)]
+    ke_max: Annotated[float, PlainValidator(the_ke_max), WithJsonSchema(KE_MAX)]
 
     def _largest_ke(self) -> tuple[str, float]:
         return "ke_max", self.ke_max

@@ -25,7 +25,14 @@ from service.jobs.job import FIRST_PRIORITY, LAST_PRIORITY, USUAL_PRIORITY
 from service.jobs.screening.request import Criteria
 from service.jobs.uploads import Uploads
 from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE_MAX, POLICY
-from service.rest.questions import check_job_name, checked_alpha, checked_policy, read_question, settings_of
+from service.rest.questions import (
+    check_job_name,
+    checked_alpha,
+    checked_policy,
+    read_question,
+    settings_of,
+    the_ke_max,
+)
 from service.screening.screen import KE_MAX as USUAL_KE_MAX
 from service.settings import Settings
 from service.sizes import TooLarge, check_length
@@ -129,10 +136,6 @@ def _range(low: float, high: float, unit: str) -> Any:
     return read
 
 
-def _ke_max(value: Any) -> float:
-    return number("ke_max", value, 0.0, KE_LIMIT, "N/m", open_low=True)
-
-
 def _ke_liner(value: Any) -> float | None:
     return None if value is None else number("ke_liner", value, 0.0, KE_LIMIT, "N/m", open_low=True)
 
@@ -219,7 +222,7 @@ class ScreeningQuestion(BaseModel):
         PlainValidator(_range(*_RATIO_LIMITS, "")),
         WithJsonSchema({**_RANGE, "description": "The same over each blade's first frequency at rest."}),
     ] = None
-    ke_max: Annotated[float, PlainValidator(_ke_max), WithJsonSchema(KE_MAX)] = USUAL_KE_MAX
+    ke_max: Annotated[float, PlainValidator(the_ke_max), WithJsonSchema(KE_MAX)] = USUAL_KE_MAX
     ke_liner: Annotated[
         float | None,
         PlainValidator(_ke_liner),

@@ -43,7 +43,16 @@ from service.roles import Role
 from service.settings import Settings
 
 # What is asked in a body and changes nothing.
-QUESTIONS = {"/v1/stability", "/v1/boundary", "/v1/sensitivities", "/v1/map", "/v1/blades"}
+QUESTIONS = {
+    "/v1/stability",
+    "/v1/boundary",
+    "/v1/sensitivities",
+    "/v1/map",
+    "/v1/blades",
+    "/v1/campbell",
+    "/v1/lobes",
+    "/v1/damping",
+}
 
 
 def service(options: Settings, **parts: Any) -> FastAPI:
@@ -116,10 +125,12 @@ def store(tmp_path) -> Iterator[KeyStore]:
     database.close()
 
 
-def test_every_route_asks_for_a_role_but_health_and_documentation():
+def test_every_route_asks_for_a_role_but_health_documentation_and_the_files_of_the_page():
     paths = unguarded(create_app())
-    assert paths == {"/healthz", "/readyz", "/docs", "/docs/oauth2-redirect", "/openapi.json", "/docs/assets"}
+    documents = {"/docs", "/docs/oauth2-redirect", "/openapi.json", "/docs/assets"}
+    assert paths == {"/healthz", "/readyz", *documents, "/", "/page"}
     assert all(is_open(path) or path == "/docs/assets" for path in paths)
+    assert not is_open("/page/../v1/models") and not is_open("/pages")
 
 
 def test_a_route_without_a_guard_is_noticed():

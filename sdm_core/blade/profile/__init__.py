@@ -2,14 +2,23 @@
 
 from sdm_core.blade.profile.blade_profile import BladeProfile
 from sdm_core.blade.profile.parametric import ParametricBlade
-from sdm_core.blade.profile.profile_file import SCHEMA, profile_from_dict, profile_to_dict, read_profile
+from sdm_core.blade.profile.profile_file import (
+    EXAMPLE_PROFILES,
+    SCHEMA,
+    example_profile_document,
+    profile_from_dict,
+    profile_to_dict,
+    read_profile,
+)
 from sdm_core.blade.profile.sections import SectionTable, read_sections
 
 __all__ = [
+    "EXAMPLE_PROFILES",
     "SCHEMA",
     "BladeProfile",
     "ParametricBlade",
     "SectionTable",
+    "example_profile_document",
     "profile_from_dict",
     "profile_to_dict",
     "read_profile",

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from sdm_core.errors import InvalidInput
 from sdm_core.json_file import read_json
 
 SCHEMA = "rubscreen/profile/1"
+EXAMPLE_PROFILES = ("transonic_profile",)
 STACKINGS = ("given", "centroids")
 MOST_SECTIONS, MOST_POINTS = 200, 5000
 
@@ -83,6 +86,26 @@ def profile_from_dict(data: Any, folder: Path | None = None) -> BladeProfile:
         tip=_part(data, "tip", TipContact),
         **given,
     )
+
+
+def example_profile_document(name: str) -> dict[str, Any]:
+    """One of the profiles shipped with the package (`EXAMPLE_PROFILES`), as its file has it.
+
+    Raises
+    ------
+    InvalidInput
+        When there is none of that name.
+
+    Examples
+    --------
+    >>> profile_from_dict(example_profile_document("transonic_profile")).name
+    'transonic-example'
+    """
+    if name not in EXAMPLE_PROFILES:
+        raise InvalidInput("example", name, f"name one of {', '.join(EXAMPLE_PROFILES)}")
+    source = resources.files("sdm_core.blade") / "examples" / f"{name}.json"
+    document: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
+    return document
 
 
 def profile_to_dict(profile: BladeProfile) -> dict[str, Any]:

@@ -32,8 +32,8 @@ async def make_blade(request: Request, body: TheJson) -> Response:
 
     def answer() -> bytes:
         ask = BladeQuestion.read(parsed(body), desk.settings)
-        if ask.profile is not None:
-            return replies.to_json(built_reply(ask.profile, verify=ask.verify))
+        if ask.shape is not None:
+            return replies.to_json(built_reply(ask.shape, verify=ask.verify))
         assert ask.blade is not None
         return replies.to_json(checked_reply(ask.blade))
 

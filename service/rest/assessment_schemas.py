@@ -1,0 +1,102 @@
+"""Campbell diagram, lobes and needed damping on the wire."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sdm_core.assessment.campbell import CampbellDiagram
+from sdm_core.assessment.mode_lobes import LobeOwner
+from sdm_core.assessment.needed_damping import NeededDamping
+from sdm_core.assessment.plain_data import plain
+
+Json = dict[str, Any]
+
+
+class CrossingReply(BaseModel):
+    """A rotor speed at which an engine order excites a mode."""
+
+    order: int
+    mode: int = Field(description="From 1.")
+    speed_hz: float
+    frequency_hz: float
+
+
+class CampbellReply(BaseModel):
+    """Natural frequencies over rotor speed, and where engine orders meet them."""
+
+    speed_hz: list[float]
+    frequency_hz: list[list[float]] = Field(description="A row a speed, a column a mode.")
+    engine_orders: list[int]
+    crossings: list[CrossingReply] = Field(description="By rising speed.")
+
+
+class TipReply(BaseModel):
+    """Tip of a lobe: the least K_e of its neighbourhood, by the exact core."""
+
+    ke: float = Field(description="N/m.")
+    speed_hz: float
+    speed_rpm: float
+    speed_ratio: float = Field(description="Over the first frequency at rest.")
+    chatter_hz: float
+    lobes_per_revolution: float
+    error_estimate: float | None = Field(description="Relative; null where it is not proven.")
+
+
+class LobeReply(BaseModel):
+    """A lobe, and the mode that owns it."""
+
+    tip: TipReply
+    mode: int = Field(description="With the natural frequency nearest the chatter frequency; from 1.")
+    frequency_hz: float = Field(description="That mode's, at the tip's speed.")
+    participation: list[float] = Field(
+        description="Share of every mode in 1/K_e, adding up to 1; empty where contact is not permanent."
+    )
+    ke_without: float | None = Field(
+        description="First crossing at the same speed without that mode; null where none below ke_max."
+    )
+
+
+class LobesReply(BaseModel):
+    """The deepest lobes, the smallest K_e first."""
+
+    speed_range_hz: list[float]
+    ke_max: float
+    lobes: list[LobeReply]
+
+
+class DampingReply(BaseModel):
+    """The damping with which no lobe comes below a stiffness."""
+
+    ke: float = Field(description="To be met, N/m.")
+    factor: float = Field(description="On every damping ratio; below 1 where some may be lost.")
+    damping_ratio: list[float] = Field(description="The blade's, times the factor.")
+    worst: TipReply | None = Field(description="Deepest lobe then.")
+    worst_now: TipReply | None = Field(description="Deepest lobe as it is; null where it is above 3 ke.")
+    steps: int = Field(description="Searches over the range of speeds.")
+
+
+def campbell_to_dict(found: CampbellDiagram) -> Json:
+    """The reply of ``POST /v1/campbell``."""
+    return {
+        "speed_hz": found.speed_hz,
+        "frequency_hz": found.frequency_hz,
+        "engine_orders": list(found.engine_orders),
+        "crossings": [plain(crossing) for crossing in found.crossings],
+    }
+
+
+def lobes_to_dict(speed_range_hz: tuple[float, float], ke_max: float, owners: tuple[LobeOwner, ...]) -> Json:
+    """The reply of ``POST /v1/lobes``."""
+    return {
+        "speed_range_hz": list(speed_range_hz),
+        "ke_max": ke_max,
+        "lobes": [plain(owner) for owner in owners],
+    }
+
+
+def damping_to_dict(found: NeededDamping) -> Json:
+    """The reply of ``POST /v1/damping``."""
+    document: Json = plain(found)
+    return document
