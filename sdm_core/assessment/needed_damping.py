@@ -1,4 +1,4 @@
-"""The damping with which a blade stays just stable over a range of speeds: what a damper would have to add."""
+"""The damping with which a blade just stays stable over a range of speeds."""
 
 from __future__ import annotations
 

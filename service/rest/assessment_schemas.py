@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from sdm_core.assessment.campbell import CampbellDiagram
 from sdm_core.assessment.mode_lobes import LobeOwner

@@ -24,7 +24,6 @@ from service.rest.questions import read_question, settings_of, the_blade
 from service.settings import Settings
 from service.sizes import TooLarge, check_length
 
-
 Json = dict[str, Any]
 
 
