@@ -86,6 +86,7 @@ export class App extends EventTarget {
       ...design.toState(),
       example: named(design.base) ?? null,
       base: named(design.base) ? null : place(bases, design.base),
+      shaped: place(bases, design.shapedBase),
       profile: place(profiles, design.profile),
     }));
     return {
@@ -96,11 +97,12 @@ export class App extends EventTarget {
 
   /** @returns {string} the view that the state was taken in */
   fromState(state) {
-    this.designs = state.designs.map(({ example, base, profile, ...rest }) =>
-      new Design(example ? this.examples.blades[example] : state.bases[base], {
-        profile: profile === null ? null : state.profiles[profile],
-      }).take(rest),
-    );
+    this.designs = state.designs.map(({ example, base, shaped, profile, ...rest }) => {
+      const loaded = example ? this.examples.blades[example] : state.bases[base];
+      const design = new Design(loaded, { profile: profile === null ? null : state.profiles[profile] });
+      design.shapedBase = shaped === null ? null : state.bases[shaped];
+      return design.take(rest);
+    });
     this.active = this.designs[state.active] ?? this.designs[0];
     Object.assign(this.range, state.range);
     this.unitName = state.unit;
