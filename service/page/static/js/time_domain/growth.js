@@ -4,8 +4,8 @@
  * What repeats each revolution, as the deflection by an oval casing does, is no vibration of its own: so the
  * motion's change from one revolution to the next, x(t) − x(t − τ), is looked at. Of a motion with Floquet
  * multiplier μ it is multiplied by |μ| each revolution, as the motion itself is. The exact core answers for
- * permanent contact and for small motions: only revolutions in which no contact node ever left the liner and
- * the liner was cut are fitted.
+ * permanent contact and for small motions: only revolutions in which every contact node cut the liner at every
+ * angle are fitted.
  */
 
 const FEWEST = 6; // revolutions, as the service's own fit of growth has it
@@ -29,12 +29,20 @@ export function changes({ displacement, perRevolution: n, revolutions }) {
   return out;
 }
 
-/** The longest run of revolutions, [first, past the last], with contact kept and the liner cut all along. */
-export function keptContact({ force, perRevolution: n, revolutions, wornVolume }) {
+/**
+ * The longest run of revolutions, [first, past the last], in which each contact node was on the liner and cut it
+ * at every angle: forces above 0, and a motion that changes by less than the depth cut in that revolution.
+ */
+export function keptContact(response) {
+  const { force, displacement, perRevolution: n, revolutions, cutDepth } = response;
+  const small = (x, q) => {
+    for (let i = q * n; i < (q + 1) * n; i += 1) if (!(Math.abs(x[i] - x[i - n]) < cutDepth[q])) return false;
+    return true;
+  };
   let best = [0, 0];
   let first = 1;
   for (let q = 1; q <= revolutions; q += 1) {
-    const kept = q < revolutions && wornVolume[q] > wornVolume[q - 1] && force.every((f) => f.subarray(q * n, (q + 1) * n).every((value) => value > 0));
+    const kept = q < revolutions && displacement.every((x) => small(x, q)) && force.every((f) => f.subarray(q * n, (q + 1) * n).every((value) => value > 0));
     if (kept) continue;
     if (q - first > best[1] - best[0]) best = [first, q];
     first = q + 1;

@@ -61,13 +61,20 @@ export class Response {
     this.damping = arrays.response_damping_j.values;
     this.contact = arrays.response_contact_j.values;
     this.friction = arrays.response_friction_j.values;
-    this.wornVolume = arrays.worn_volume_m3.values;
+    this.cutDepth = cutDepths(arrays.worn_volume_m3.values, arrays.worn_m.values);
   }
 
   /** Revolutions gone by at a sample: 0.5 is half a turn. */
   turn(sample) {
     return (sample + 1) / this.perRevolution;
   }
+}
+
+/** Mean depth [m] cut in each revolution: volumes [m³] by the end of each go with the depths in the end. */
+function cutDepths(volume, worn) {
+  const whole = volume.reduce((most, value) => (value > most ? value : most), 0);
+  const depth = worn.reduce((sum, value) => sum + value, 0) / worn.length;
+  return Float64Array.from(volume, (value, q) => (whole > 0 ? ((value - (q ? volume[q - 1] : 0)) * depth) / whole : 0));
 }
 
 const column = (values, width, j) => Float64Array.from({ length: values.length / width }, (_, i) => values[i * width + j]);

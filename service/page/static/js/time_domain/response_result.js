@@ -49,7 +49,7 @@ export class ResponseResult {
         "table", {}, h("caption", {}, `Onset at ${unit.write(speed)}, K_e = ${number(figures.ke)} N/m`), heads("", "Simulation, while contact is kept", "Exact core, permanent contact"),
         h(
           "tbody", {}, row("Verdict", word, core),
-          row("Growth ln |μ| a revolution", fitted ? `${growthWords(fitted.growth)}, ± ${number(fitted.uncertainty, 2)}` : "–", growthWords(figures.growth_per_revolution[0])),
+          row("Growth ln |μ| a revolution", fitted ? `${growthWords(fitted.growth)}; fit ± ${number(fitted.uncertainty, 2)}` : "–", growthWords(figures.growth_per_revolution[0])),
           row(stable === false ? "Chatter frequency" : "Frequency of the motion", hz(fitted?.hz ?? null), hz(figures.chatter_hz[0])),
         ),
       ),

@@ -44,7 +44,7 @@ function keptSentences(fitted, end, stable) {
   const left = kept[1] + 1 < end.count;
   if (left && end.peak > kept[1]) {
     const after = { grows: "and still grows at the end", settles: "and then dies down", "goes on": "and goes on to the end" }[end.way];
-    parts.push(`From revolution ${kept[1] + 2} on the tip leaves the liner for part of the time: the vibration is strongest in revolution ${end.peak + 1} ${after}.`);
+    parts.push(`From revolution ${kept[1] + 2} on the tip no longer cuts all the way round: the vibration is strongest in revolution ${end.peak + 1} ${after}.`);
   }
   return parts;
 }
