@@ -11,7 +11,7 @@
 const FEWEST = 6; // revolutions, as the service's own fit of growth has it
 const FAINTEST = 1e-9; // of the largest displacement: below, rounding is looked at
 const SPECTRUM_REVOLUTIONS = 8;
-const TREND_SHARE = 0.25; // of all revolutions, at the end
+const LAST = 10; // revolutions that tell how it ends
 const STEADY = 0.005; // ln of the change a revolution, that counts as neither growing nor dying away
 
 /**
@@ -116,7 +116,7 @@ function amplitude(signal, angle) {
  */
 export function ending(change) {
   const all = Array.from(change).slice(1);
-  const part = all.slice(-Math.max(2, Math.ceil(all.length * TREND_SHARE)));
+  const part = all.slice(-LAST);
   const slope = part.length > 1 ? line(part.map((value) => Math.log(Math.max(value, 1e-300)))).slope : 0;
   const most = Math.max(...all);
   const way = !(most > 0) || slope < -STEADY ? "settles" : slope > STEADY ? "grows" : "goes on";

@@ -15,9 +15,9 @@ export class JobPanel {
     const id = fresh("job");
     this.title = h("h3", { id });
     this.state = h("p", { class: "state" });
-    this.bar = h("progress", { max: 1, value: 0, "aria-labelledby": id });
-    this.cancel = h("button", { type: "button", onclick: cancel }, "Cancel");
-    this.retry = h("button", { type: "button", onclick: retry }, "Run again");
+    this.bar = h("progress", { max: 1, value: 0, "aria-labelledby": id, hidden: true });
+    this.cancel = h("button", { type: "button", onclick: cancel, hidden: true }, "Cancel");
+    this.retry = h("button", { type: "button", onclick: retry, hidden: true }, "Run again");
     this.fault = h("p", { class: "problem", role: "alert", hidden: true });
     this.element = h("div", { class: "job", hidden: true }, this.title, h("div", { class: "row no-print" }, this.bar, this.state, this.cancel, this.retry), this.fault);
     this.said = "";

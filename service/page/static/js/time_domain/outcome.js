@@ -21,6 +21,11 @@ export class Outcome {
     this.response = arrays.response_time_s ? new Response(this) : null;
   }
 
+  /** Whether it says no less than another of the same job: answers may overtake each other. */
+  after(other) {
+    return !other || this.figures.complete || (!other.figures.complete && this.figures.speed_hz.length >= other.figures.speed_hz.length);
+  }
+
   get nodes() {
     return this.figures.contact_nodes;
   }

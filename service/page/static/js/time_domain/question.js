@@ -27,7 +27,7 @@ export class QuestionForm {
     );
     this.thickness = new Field({ label: "Thickness of the liner", unit: "mm", factor: 1e3, min: 0, hint: "Worn through beyond it." });
     this.cells = new Field({ label: "Cells round the casing", whole: true, min: 4, hint: "How finely the liner is divided." });
-    this.steps = new Field({ label: "Time steps in a cell", whole: true, min: 1, empty: "as few as the modes allow", hint: "More only where the answer is doubted." });
+    this.steps = new Field({ label: "Time steps in a cell", whole: true, min: 1, empty: "least", hint: "Empty: as few as the modes allow." });
     this.revolutions = new Field({ label: "Revolutions", whole: true, min: 1, hint: "150 show growth from the first touch on." });
     this.low = new Field({ label: "From", min: 0, hint: "Slowest speed." });
     this.high = new Field({ label: "to", min: 0, hint: "Fastest speed." });

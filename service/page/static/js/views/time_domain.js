@@ -33,18 +33,13 @@ export class TimeView {
   show() {
     this.visible = true;
     this.question.refresh();
+    this.draw();
     this.resume();
-    for (const chart of this.charts) chart.redraw();
   }
 
   hide() {
     this.visible = false;
     this.stop();
-  }
-
-  /** The charts that are looked at. */
-  get charts() {
-    return this.shown ? this.shown.charts.all : [];
   }
 
   changed(what) {
@@ -63,7 +58,13 @@ export class TimeView {
 
   stop() {
     this.stopper?.abort();
-    this.following = false;
+    this.busy(false);
+  }
+
+  /** Whether there is more to come. */
+  busy(now) {
+    this.following = now;
+    this.result.setAttribute("aria-busy", now);
   }
 
   async submit(body) {
@@ -87,7 +88,8 @@ export class TimeView {
     const stopper = new AbortController();
     this.stopper = stopper;
     if (this.job !== id) this.forget();
-    Object.assign(this, { job: id, following: true, complete: false });
+    Object.assign(this, { job: id, complete: false });
+    this.busy(true);
     this.app.simulation = id;
     this.earlier.mark(id);
     if (job) this.told(job);
@@ -101,8 +103,10 @@ export class TimeView {
     } catch (error) {
       if (error instanceof Problem) this.panel.refuse(error);
       else if (!(error instanceof Unreachable) && error.name !== "AbortError") throw error;
+      // A service that is about to stop says 503 before it is away.
+      if (error.status === 503) setTimeout(() => this.stopper === stopper && this.visible && this.open(id), BETWEEN_MS);
     } finally {
-      if (this.stopper === stopper) this.following = false;
+      if (this.stopper === stopper) this.busy(false);
     }
   }
 
@@ -120,7 +124,7 @@ export class TimeView {
     this.fetching = true;
     try {
       const outcome = await outcomeOf(id, signal);
-      if (this.job !== id || signal.aborted) return;
+      if (this.job !== id || signal.aborted || !outcome.after(this.outcome)) return;
       this.outcome = outcome;
       this.draw();
       if (outcome.figures.complete) say(this.shown.sentence.textContent);
@@ -152,8 +156,10 @@ export class TimeView {
   async change(method, what) {
     try {
       const job = await (await request(`v1/simulations/${this.job}${what}`, { method })).json();
-      if (what) this.open(job.id, job);
-      else this.told(job);
+      if (what) {
+        this.forget();
+        this.open(job.id, job);
+      } else this.told(job);
     } catch (error) {
       if (error instanceof Problem) this.panel.refuse(error);
       else if (!(error instanceof Unreachable)) throw error;
