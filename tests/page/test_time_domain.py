@@ -1,4 +1,4 @@
-"""The view "Time domain": a rub simulated from the page, held against the exact core, opened again, refused."""
+"""The view "Time domain": a rub simulated from the page, held against the exact core, kept, refused."""
 
 from __future__ import annotations
 
