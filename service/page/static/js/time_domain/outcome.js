@@ -26,6 +26,7 @@ export class Outcome {
     return !other || this.figures.complete || (!other.figures.complete && this.figures.speed_hz.length >= other.figures.speed_hz.length);
   }
 
+  /** Names of the contact nodes. */
   get nodes() {
     return this.figures.contact_nodes;
   }

@@ -124,7 +124,7 @@ export class ResponseCharts {
     const { nodes, angle, figures } = this.outcome;
     const degrees = Array.from(angle, (a) => (a * 180) / Math.PI);
     const depth = nodes.map((_, j) => Array.from(this.outcome.worn(0, j), (v) => v * MICRO));
-    const [least, deepest] = [Math.min(...depth.flat()), Math.max(...depth.flat())];
+    const [least, deepest] = [Math.min, Math.max].map((pick) => depth.flat().reduce((a, b) => pick(a, b)));
     // Of a liner cut evenly the lobes would not be seen from its old surface down.
     const top = least > 0.5 * deepest ? least - 0.4 * (deepest - least) : 0;
     const bottom = deepest > 0 ? deepest + 0.12 * (deepest - top) : 1;

@@ -94,7 +94,7 @@ export class WearCharts {
     const count = Math.floor(frequency.length / together);
     const middle = Array.from({ length: count }, (_, k) => (frequency[k * together] + frequency[(k + 1) * together - 1]) / 2);
     const z = middle.map((_, k) => spectrum.map((row) => row.subarray(k * together, (k + 1) * together).reduce((a, b) => Math.max(a, b)) * MICRO));
-    const top = Math.ceil(Math.log10(Math.max(...z.flat(), 1e-9)));
+    const top = Math.ceil(Math.log10(z.flat().reduce((a, b) => Math.max(a, b), 1e-9)));
     const highest = frequency.at(-1);
     const natural = figures.natural_hz[0].map((_, j) => ({
       x: this.x, y: figures.natural_hz.map((row) => row[j]), mode: "lines", name: "natural frequencies", legendgroup: "natural", showlegend: j === 0,
@@ -122,7 +122,7 @@ export class WearCharts {
   /** Engine orders with their numbers at the right. */
   orders(highest) {
     const speeds = this.outcome.figures.speed_hz;
-    const many = Math.floor(highest / speeds.at(-1));
+    const many = Math.floor((0.97 * highest) / speeds.at(-1)); // a number further up would leave the chart
     const every = Math.max(1, Math.ceil(many / MOST_ORDERS));
     const numbers = [];
     for (let k = every; k <= many; k += every) numbers.push(k);

@@ -46,7 +46,7 @@ export class WearResult {
     fill(this.body, h(
       "table", {}, h("caption", {}, `By speed; lobes under ${nodes.join(", ")}, the others the largest of all nodes`),
       h("thead", {}, h("tr", {}, column(unit.title), column("Exact core, permanent contact", ""), column("ln |μ| a revolution"), column("Chatter [Hz]"), column("Wear lobes"),
-        column("Deepest wear [µm]"), column("Largest displacement [µm]"), column("Strongest at the end [Hz]"), column("", ""))),
+        column("Deepest wear [µm]"), column("Largest displacement [µm]"), column("Strongest at the end [Hz]"), column("Response", ""))),
       h("tbody", {}, figures.speed_hz.map(row)),
     ));
   }
