@@ -111,6 +111,22 @@ def test_below_the_critical_stiffness_the_rub_dies_away_and_its_figures_can_be_s
     assert len(text) > 1000
 
 
+def test_a_liner_worn_through_ends_the_simulation_and_the_page_says_when(rub):
+    page = rub.page
+    page.get_by_text("Friction, thickness, steps").click()
+    field(page, "Thickness of the liner").fill("0.3")
+    sentence = ask_response(page)
+    found = re.search(r"worn through in revolution (\d+)", sentence)
+    assert found and 20 < int(found[1]) < 40
+    assert f"after {found[1]} revolutions" in page.inner_text(".tables")
+    with page.expect_download() as saved:
+        page.get_by_role(
+            "button", name="Two revolutions about the largest displacement: save the figures"
+        ).click()
+    moved = [float(line.split(",")[1]) for line in saved.value.path().read_text().splitlines()[1:]]
+    assert max(moved) < -10.0  # pressed back by the liner to the last, and not at rest afterwards
+
+
 def test_an_oval_casing_lets_the_tip_go_and_the_page_says_that_the_two_are_not_comparable(rub, pictures):
     page = rub.page
     response_form(page).get_by_label("The casing").select_option("oval")

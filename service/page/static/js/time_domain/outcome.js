@@ -58,11 +58,15 @@ export class Response {
   constructor({ figures, arrays }) {
     this.perRevolution = Number(arrays.response_samples_per_revolution.values[0]);
     const { shape: [samples, nodes], values } = arrays.response_displacement_m;
-    this.samples = samples;
-    this.revolutions = Math.floor(samples / this.perRevolution);
+    // What would have come after the liner was worn through stands there as zeros.
+    let end = samples;
+    if (figures.worn_through[0]) while (end > this.perRevolution && values.subarray((end - 1) * nodes, end * nodes).every((value) => value === 0)) end -= 1;
+    this.samples = end;
+    /** Whole ones; the energy account has the last one begun, too. */
+    this.revolutions = Math.floor(end / this.perRevolution);
     this.speedHz = figures.speed_hz[0];
-    this.displacement = figures.contact_nodes.map((node) => column(values, nodes, figures.tip_nodes.indexOf(node)));
-    this.force = figures.contact_nodes.map((_, j) => column(arrays.response_force_n.values, figures.contact_nodes.length, j));
+    this.displacement = figures.contact_nodes.map((node) => column(values, nodes, figures.tip_nodes.indexOf(node)).subarray(0, end));
+    this.force = figures.contact_nodes.map((_, j) => column(arrays.response_force_n.values, figures.contact_nodes.length, j).subarray(0, end));
     this.energy = arrays.response_energy_j.values;
     this.damping = arrays.response_damping_j.values;
     this.contact = arrays.response_contact_j.values;

@@ -23,7 +23,7 @@ export class ResponseResult {
     const change = changes(response);
     const fitted = fittedGrowth(response, change, outcome.frequency.at(-1));
     const end = { ...ending(change), count: response.revolutions };
-    const said = verdict(fitted, end, figures.stable[0], figures.worn_through[0], response.revolutions);
+    const said = verdict(fitted, end, figures.stable[0], figures.worn_through[0], response.energy.length);
     this.sentence.className = `verdict ${said.look}`;
     this.sentence.textContent = said.text;
     this.drawTables(outcome, fitted, unit);
@@ -54,7 +54,7 @@ export class ResponseResult {
         ),
       ),
       h(
-        "table", {}, h("caption", {}, `In the end, after ${outcome.response.revolutions} revolutions`), heads("Contact node", "Largest displacement", "Largest force", "Deepest wear", "Wear lobes"),
+        "table", {}, h("caption", {}, `In the end, after ${outcome.response.energy.length} revolutions`), heads("Contact node", "Largest displacement", "Largest force", "Deepest wear", "Wear lobes"),
         h("tbody", {}, outcome.nodes.map((node, j) => row(
           node, `${number(figures.peak_m[0][figures.tip_nodes.indexOf(node)] * MICRO, 3)} µm`, `${number(figures.force_peak_n[0][j], 3)} N`,
           `${number(figures.deepest_m[0][j] * MICRO, 3)} µm`,
@@ -70,6 +70,7 @@ export class ResponseResult {
 function account(energy) {
   if (!energy) return "";
   const mj = (joule) => `${number(joule * MILLI, 3)} mJ`;
-  const rubbing = energy.work_of_friction_j ? `, friction took ${mj(-energy.work_of_friction_j)}` : "";
-  return `Energy: contact put in ${mj(energy.work_of_contact_j)}, damping took ${mj(-energy.work_of_damping_j)}${rubbing}, the blade holds ${mj(energy.energy_j)}; unaccounted for ${mj(energy.imbalance_j)}.`;
+  const friction = energy.work_of_friction_j;
+  const rubbing = friction ? `, friction ${friction > 0 ? "put in" : "took"} ${mj(Math.abs(friction))}` : "";
+  return `Energy: contact put in ${mj(energy.work_of_contact_j)}, damping took ${mj(-energy.work_of_damping_j)}${rubbing}, the blade holds ${mj(energy.energy_j)}; unaccounted for ${mj(energy.imbalance_j)}.${friction ? " The exact core's verdict is without friction." : ""}`;
 }
