@@ -15,6 +15,8 @@ export class App extends EventTarget {
   caller = { name: "", role: "read", key_id: null };
   /** A point of the map that was chosen: {speed_hz, ke}; null for none. */
   point = null;
+  /** Id of the simulation that is looked at; null for none. */
+  simulation = null;
 
   get unit() {
     return new SpeedUnit(this.unitName, this.active?.firstHz ?? 1);
@@ -91,7 +93,7 @@ export class App extends EventTarget {
     }));
     return {
       version: 1, view: viewName, designs, active: this.designs.indexOf(this.active), bases, profiles,
-      range: this.range, unit: this.unitName, point: this.point,
+      range: this.range, unit: this.unitName, point: this.point, simulation: this.simulation,
     };
   }
 
@@ -107,6 +109,7 @@ export class App extends EventTarget {
     Object.assign(this.range, state.range);
     this.unitName = state.unit;
     this.point = state.point;
+    this.simulation = state.simulation ?? null;
     return state.view;
   }
 }
