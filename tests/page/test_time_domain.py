@@ -74,7 +74,7 @@ def rub(service, opened):
 def test_a_rub_that_grows_grows_as_the_exact_core_says_and_at_its_chatter_frequency(rub, pictures):
     page = rub.page
     assert field(page, "Rotor speed").input_value() == "100"
-    assert field(page, "K_e of the liner").input_value() == "15000"
+    assert field(page, "Kₑ of the liner").input_value() == "15000"
     sentence = ask_response(page)
     assert "grows by 8.9 % a revolution" in sentence
     assert "the exact core agrees: permanent contact is unstable" in sentence
@@ -97,7 +97,7 @@ def test_a_rub_that_grows_grows_as_the_exact_core_says_and_at_its_chatter_freque
 
 def test_below_the_critical_stiffness_the_rub_dies_away_and_its_figures_can_be_saved(rub):
     page = rub.page
-    field(page, "K_e of the liner").fill("5000")
+    field(page, "Kₑ of the liner").fill("5000")
     field(response_form(page), "Revolutions", "fieldset").fill("60")
     sentence = ask_response(page)
     assert "dies away" in sentence and "the exact core agrees: permanent contact is stable" in sentence
@@ -192,7 +192,7 @@ def test_what_the_service_refuses_is_said_at_its_field_and_nothing_typed_is_lost
     refused(wear, "Lobes of the ovalisation", "0", "from 1 to 200", many)
     refused(wear, "to", "5000", "modal data from 0 to", many)
     refused(wear, "Speeds", "1", "2 speeds or more", many)
-    refused(whole, "K_e of the liner", "1e7", "springs back whole", one)
+    refused(whole, "Kₑ of the liner", "1e7", "springs back whole", one)
     page.get_by_text("Friction, thickness, steps").click()
     refused(whole, "Friction coefficient", "-1", "from 0 up to 10", one)
     field(response, "Clearance", "fieldset").fill("-100")

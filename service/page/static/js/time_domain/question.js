@@ -19,7 +19,7 @@ export class QuestionForm {
     this.design = null;
     const moved = () => this.tellPoint();
     this.speed = new Field({ label: "Rotor speed", min: 0, change: moved, hint: "At which the blade turns." });
-    this.ke = new Field({ label: "K_e of the liner", unit: "N/m", min: 0, change: moved, hint: "How stiffly it is cut under each contact node." });
+    this.ke = new Field({ label: "Kₑ of the liner", unit: "N/m", min: 0, change: moved, hint: "How stiffly it is cut under each contact node." });
     this.friction = new Field({ label: "Friction coefficient", min: 0, empty: "none", hint: "Of tip on liner; needs tangential mode shapes. Empty: none." });
     this.rotation = h(
       "select", { "aria-label": "The blade turns" },
@@ -120,7 +120,7 @@ export class QuestionForm {
       this.design.changeName && ` (${this.design.changeName})`);
     const told = [];
     if (this.nodes.some((node) => this.design.weights[node] !== 1)) {
-      told.push("Weights count as 1 here: each contact node meets the liner with the whole K_e.");
+      told.push("Weights count as 1 here: each contact node meets the liner with the whole Kₑ.");
     }
     if (this.design.arcs) told.push("Arcs are not simulated: an oval casing decides where the tip touches.");
     fill(this.caution, told.join(" "));

@@ -46,7 +46,7 @@ export class ResponseResult {
     fill(
       this.tables,
       h(
-        "table", {}, h("caption", {}, `Onset at ${unit.write(speed)}, K_e = ${number(figures.ke)} N/m`), heads("", "Simulation, while contact is kept", "Exact core, permanent contact"),
+        "table", {}, h("caption", {}, `Onset at ${unit.write(speed)}, Kₑ = ${number(figures.ke)} N/m`), heads("", "Simulation, while contact is kept", "Exact core, permanent contact"),
         h(
           "tbody", {}, row("Verdict", word, core),
           row("Growth ln |μ| a revolution", fitted ? `${growthWords(fitted.growth)}; fit ± ${number(fitted.uncertainty, 2)}` : "–", growthWords(figures.growth_per_revolution[0])),
