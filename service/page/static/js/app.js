@@ -15,6 +15,8 @@ export class App extends EventTarget {
   caller = { name: "", role: "read", key_id: null };
   /** A point of the map that was chosen: {speed_hz, ke}; null for none. */
   point = null;
+  /** Identifier of the screening that is open; null for none. */
+  job = null;
 
   get unit() {
     return new SpeedUnit(this.unitName, this.active?.firstHz ?? 1);
@@ -90,7 +92,7 @@ export class App extends EventTarget {
     }));
     return {
       version: 1, view: viewName, designs, active: this.designs.indexOf(this.active), bases, profiles,
-      range: this.range, unit: this.unitName, point: this.point,
+      range: this.range, unit: this.unitName, point: this.point, job: this.job,
     };
   }
 
@@ -105,6 +107,7 @@ export class App extends EventTarget {
     Object.assign(this.range, state.range);
     this.unitName = state.unit;
     this.point = state.point;
+    this.job = state.job ?? null;
     return state.view;
   }
 }
