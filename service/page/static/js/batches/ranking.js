@@ -195,7 +195,7 @@ const liner = (results) => (results[0]?.ke_liner ? `, ${stiffness(results[0].ke_
 function margin(row) {
   if (row.ke_liner === null) return "–";
   const at = row.margin ?? row.ke_max / row.ke_liner - 1;
-  const text = `${at > 0 ? "+" : ""}${percent(at)}`;
+  const text = `${at > 0 ? "+" : ""}${percent(at)}`.replace(" ", "\u00a0"); // the unit stays with its number
   return row.margin === null ? `over ${text}` : text;
 }
 

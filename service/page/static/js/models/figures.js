@@ -10,7 +10,8 @@ export const inWords = (contact) => CLASSES[contact] ?? contact;
 /** Evaluation by class of contact; an older card has that of permanent contact alone. */
 export function evaluations(card) {
   const found = card.evaluation ?? {};
-  return found.auto ? { permanent: found } : found;
+  if (found.auto) return { permanent: found };
+  return Object.fromEntries(Object.keys(CLASSES).filter((name) => found[name]).map((name) => [name, found[name]]));
 }
 
 export const certificates = (card) => card.certificates ?? [];

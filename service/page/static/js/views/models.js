@@ -24,6 +24,7 @@ export class ModelsView {
     this.exchange = new Exchange(() => {
       this.looked = null;
       this.load();
+      app.changed("model");
     });
     this.state = h("div");
     this.fault = h("p", { class: "problem", role: "alert", hidden: true });
