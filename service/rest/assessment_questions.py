@@ -36,6 +36,11 @@ _ORDERS: Json = {
     "description": "Engine orders.",
 }
 
+_KE_LINER: Json = {
+    "oneOf": [{"type": "number", "exclusiveMinimum": 0, "maximum": KE_LIMIT}, {"type": "null"}],
+    "description": "Of the liner, N/m: the answer then tells at which speeds it destabilises.",
+}
+
 
 def _range(value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
@@ -61,6 +66,10 @@ def _count(value: Any) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= MOST_LOBES:
         raise InvalidInput("count", value, f"give a whole number from 1 to {MOST_LOBES}")
     return value
+
+
+def _ke_liner(value: Any) -> float | None:
+    return None if value is None else number("ke_liner", value, 0.0, KE_LIMIT, "N/m", open_low=True)
 
 
 def _ke(value: Any) -> float:
@@ -107,9 +116,12 @@ class LobesQuestion(RangeQuestion):
         PlainValidator(_count),
         WithJsonSchema({"type": "integer", "minimum": 1, "maximum": MOST_LOBES, "default": USUAL_LOBES}),
     ] = USUAL_LOBES
+    ke_liner: Annotated[float | None, PlainValidator(_ke_liner), WithJsonSchema(_KE_LINER)] = None
 
     @model_validator(mode="after")
     def _the_core_can_reach_it(self, info: ValidationInfo) -> Self:
+        if self.ke_liner is not None and self.ke_liner > self.ke_max:
+            raise InvalidInput("ke_liner", self.ke_liner, f"give at most ke_max, {self.ke_max:g} N/m")
         _check_reach(self.blade, self.contact, self.speed_range_hz, "ke_max", self.ke_max, info)
         return self
 

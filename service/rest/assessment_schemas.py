@@ -10,6 +10,8 @@ from sdm_core.assessment.campbell import CampbellDiagram
 from sdm_core.assessment.mode_lobes import LobeOwner
 from sdm_core.assessment.needed_damping import NeededDamping
 from sdm_core.assessment.plain_data import plain
+from sdm_core.assessment.unstable_speeds import SpeedInterval
+from service.rest.assessment_questions import LobesQuestion
 
 Json = dict[str, Any]
 
@@ -64,6 +66,11 @@ class LobesReply(BaseModel):
     speed_range_hz: list[float]
     ke_max: float
     lobes: list[LobeReply]
+    unstable_speeds_hz: list[list[float]] | None = Field(
+        description="Rotor speeds at which ke_liner destabilises, edges exact; null without it."
+    )
+    unstable_share: float | None = Field(description="Their share of the range; null without ke_liner.")
+    proven: bool | None = Field(description="Whether every point they rest on is; null without ke_liner.")
 
 
 class DampingReply(BaseModel):
@@ -87,13 +94,25 @@ def campbell_to_dict(found: CampbellDiagram) -> Json:
     }
 
 
-def lobes_to_dict(speed_range_hz: tuple[float, float], ke_max: float, owners: tuple[LobeOwner, ...]) -> Json:
+def lobes_to_dict(
+    ask: LobesQuestion,
+    owners: tuple[LobeOwner, ...],
+    unstable: tuple[tuple[SpeedInterval, ...], bool] | None,
+) -> Json:
     """The reply of ``POST /v1/lobes``."""
-    return {
-        "speed_range_hz": list(speed_range_hz),
-        "ke_max": ke_max,
+    low, high = ask.speed_range_hz
+    document: Json = {
+        "speed_range_hz": [low, high],
+        "ke_max": ask.ke_max,
         "lobes": [plain(owner) for owner in owners],
+        **dict.fromkeys(("unstable_speeds_hz", "unstable_share", "proven")),
     }
+    if unstable is not None:
+        intervals, proven = unstable
+        document["unstable_speeds_hz"] = [[found.low_hz, found.high_hz] for found in intervals]
+        document["unstable_share"] = sum(found.high_hz - found.low_hz for found in intervals) / (high - low)
+        document["proven"] = proven
+    return document
 
 
 def damping_to_dict(found: NeededDamping) -> Json:

@@ -15,6 +15,7 @@ from sdm_core.blade.tracking import FURTHER_SHAPES
 from sdm_core.contact import ContactConfiguration
 from sdm_core.fourier_engagement import MOST_HARMONICS
 from sdm_core.validation import AMPLITUDE_LIMIT, FREQUENCY_LIMITS_HZ, KE_LIMIT, SPEED_LIMITS_HZ, WEIGHT_LIMIT
+from service.rest.replies import MAP_FIELDS
 from training.answers import POLICIES
 
 Json = dict[str, Any]
@@ -132,6 +133,14 @@ ALPHA: Json = {
     "oneOf": [{"type": "number", "exclusiveMinimum": 0, "maximum": 1}, {"type": "null"}],
     "description": "Rate of unstable designs among those called stable that the answers must keep, under "
     "policy auto: one of those the model's card has a certificate for (GET /v1/models). Left out: 5e-4.",
+}
+
+MAP_FIELDS_SCHEMA: Json = {
+    "oneOf": [
+        {"type": "array", "minItems": 1, "uniqueItems": True, "items": {"enum": list(MAP_FIELDS)}},
+        {"type": "null"},
+    ],
+    "description": "Those of a map's arrays that the answer is to hold. Left out: all of them.",
 }
 
 

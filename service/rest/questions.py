@@ -25,7 +25,17 @@ from sdm_core.validation import KE_LIMIT, number, speeds, stiffnesses
 from service.field_values import nearest, remedy_for
 from service.jobs.job import LONGEST_NAME
 from service.rest.known_blades import KnownBlades
-from service.rest.question_schemas import ALPHA, BLADE, CONTACT, KE, KE_MAX, POLICY, SPEEDS
+from service.rest.question_schemas import (
+    ALPHA,
+    BLADE,
+    CONTACT,
+    KE,
+    KE_MAX,
+    MAP_FIELDS_SCHEMA,
+    POLICY,
+    SPEEDS,
+)
+from service.rest.replies import MAP_FIELDS
 from service.settings import Settings
 from service.sizes import TooLarge, check_blade_size, check_length, check_reach
 from training.answers import POLICIES
@@ -182,8 +192,23 @@ class SensitivitiesQuestion(BoundaryQuestion):
         return self
 
 
+def _fields(value: Any) -> tuple[str, ...]:
+    if value is None:
+        return MAP_FIELDS
+    if not isinstance(value, list) or not value:
+        raise InvalidInput("fields", value, f"give a list of {', '.join(MAP_FIELDS)}, or leave it out")
+    for i, name in enumerate(value):
+        if not isinstance(name, str) or name not in MAP_FIELDS or name in value[:i]:
+            raise InvalidInput(f"fields[{i}]", name, f"give each of {', '.join(MAP_FIELDS)} once at most")
+    return tuple(value)
+
+
 class MapQuestion(KeQuestion):
     """Where in the plane of speed and stiffness is the blade stable?"""
+
+    fields: Annotated[tuple[str, ...], PlainValidator(_fields), WithJsonSchema(MAP_FIELDS_SCHEMA)] = (
+        MAP_FIELDS
+    )
 
     @model_validator(mode="after")
     def _not_too_many_points(self, info: ValidationInfo) -> Self:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import orjson
 
 from sdm_core.errors import DamagedFile
+from service.rest.forms.npz_replies import packed
 from training.answers import (
     BoundaryAnswers,
     CertificateUsed,
@@ -33,7 +35,9 @@ _POINT_FLOATS = (
 _BOUNDARY_FLOATS = ("critical_ke", "chatter_hz", "error_estimate")
 _SENSITIVITY_FLOATS = (*_BOUNDARY_FLOATS, "value", "derivative", "relative")
 _LABELS = ("source", "reason")
-_MAP_ARRAYS = ("speed_hz", "ke", "stable", "unstable_probability", *_LABELS)
+# What a map's question may choose among.
+MAP_FIELDS = ("stable", "unstable_probability", *_LABELS)
+_MAP_ARRAYS = ("speed_hz", "ke", *MAP_FIELDS)
 
 
 def to_json(document: Json | None) -> bytes:
@@ -101,16 +105,18 @@ def sensitivities_from_dict(reply: Json, speed_hz: np.ndarray, ke_max: float) ->
     )
 
 
-def map_to_dict(answers: MapAnswers) -> Json:
-    """The reply of ``POST /v1/map``."""
-    return {
+def map_to_dict(answers: MapAnswers, fields: Sequence[str] = MAP_FIELDS) -> Json:
+    """The reply of ``POST /v1/map``, with those of `MAP_FIELDS` that were asked for."""
+    left_out = set(MAP_FIELDS) - set(fields)
+    document = {
         **_columns(answers, ("speed_hz", "ke")),
-        "stable": _truths(answers.stable),
+        "stable": _truths(answers.stable) if "stable" in fields else None,
         **_columns(answers, ("unstable_probability",)),
         **_origin(answers),
         "exact_share": answers.exact_share,
         "unstable_share": answers.unstable_share,
     }
+    return {name: value for name, value in document.items() if name not in left_out}
 
 
 def map_from_dict(reply: Json) -> MapAnswers:
@@ -119,15 +125,19 @@ def map_from_dict(reply: Json) -> MapAnswers:
     return MapAnswers(**floats, **_origin_from(reply))
 
 
-def map_to_npz(answers: MapAnswers) -> bytes:
-    """The map as a compressed npz: its arrays, `model` ('' for none), `solver`, and `certificate` as JSON."""
-    buffer = io.BytesIO()
-    arrays: Json = {name: np.asarray(getattr(answers, name)) for name in _MAP_ARRAYS}
-    arrays |= {name: arrays[name].astype(str) for name in _LABELS}
+def map_to_npz(answers: MapAnswers, fields: Sequence[str] = MAP_FIELDS) -> bytes:
+    """The map as a compressed npz: its arrays, `model` ('' for none), `solver`, and `certificate` as JSON.
+
+    Parameters
+    ----------
+    fields
+        Those of `MAP_FIELDS` that were asked for.
+    """
+    arrays: Json = {name: np.asarray(getattr(answers, name)) for name in ("speed_hz", "ke", *fields)}
+    arrays |= {name: arrays[name].astype(str) for name in _LABELS if name in fields}
     arrays["model"], arrays["solver"] = np.array(answers.model or ""), np.array(answers.solver)
     arrays["certificate"] = np.array(to_json(_origin(answers)["certificate"]).decode())
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
+    return packed(arrays)
 
 
 def map_from_npz(content: bytes) -> MapAnswers:

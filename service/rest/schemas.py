@@ -89,7 +89,7 @@ class SensitivitiesReply(Reply):
 
 
 class MapReply(Reply):
-    """Verdicts on a grid: rows go with `ke`, columns with `speed_hz`."""
+    """Verdicts on a grid: rows go with `ke`, columns with `speed_hz`; of the arrays those of `fields`, if given."""
 
     speed_hz: list[float]
     ke: list[float]

@@ -9,12 +9,14 @@ from starlette.responses import Response
 from sdm_core.assessment.campbell import campbell_diagram
 from sdm_core.assessment.mode_lobes import lobe_owners
 from sdm_core.assessment.needed_damping import needed_damping
+from sdm_core.assessment.unstable_speeds import unstable_speeds
 from sdm_core.lobe_tips import least_critical_ke
 from service.rest.access import READ
 from service.rest.assessment_questions import (
     CAMPBELL_EXAMPLE,
     DAMPING_EXAMPLE,
     LOBES_EXAMPLE,
+    MOST_LOBES,
     CampbellQuestion,
     DampingQuestion,
     LobesQuestion,
@@ -71,9 +73,15 @@ async def deepest_lobes(request: Request, body: TheJson) -> Response:
 
     def answer() -> bytes:
         ask = LobesQuestion.read(parsed(body), desk.settings)
-        tips = least_critical_ke(ask.blade, ask.contact, *ask.speed_range_hz, ask.ke_max, count=ask.count)
-        owners = lobe_owners(ask.blade, ask.contact, tips, ask.ke_max)
-        return to_json(lobes_to_dict(ask.speed_range_hz, ask.ke_max, owners))
+        # All of them where speeds are asked about: an unstable range may be as narrow as a lobe's tip.
+        count = ask.count if ask.ke_liner is None else MOST_LOBES
+        tips = least_critical_ke(ask.blade, ask.contact, *ask.speed_range_hz, ask.ke_max, count=count)
+        unstable = None
+        if ask.ke_liner is not None:
+            deep = [tip.speed_hz for tip in tips if tip.ke <= ask.ke_liner]
+            unstable = unstable_speeds(ask.blade, ask.contact, ask.speed_range_hz, ask.ke_liner, deep)
+        owners = lobe_owners(ask.blade, ask.contact, tips[: ask.count], ask.ke_max)
+        return to_json(lobes_to_dict(ask, owners, unstable))
 
     return Response(await desk.work.run(answer, request), media_type=JSON)
 

@@ -129,10 +129,10 @@ async def map_of_stability(request: Request, body: TheGrid) -> Response:
         answerer = desk.answerer(ask.policy)
         found = answerer.map(ask.blade, ask.contact, ask.speed_hz, ask.ke, ask.policy, ask.alpha)
         if form == JSON:
-            return replies.to_json(replies.map_to_dict(found))
+            return replies.to_json(replies.map_to_dict(found, ask.fields))
         if form == PNG:
             return _chart(answerer, ask, found)
-        return replies.map_to_npz(found)
+        return replies.map_to_npz(found, ask.fields)
 
     return Response(await desk.work.run(answer, request), media_type=form, headers=VARY)
 

@@ -86,6 +86,7 @@ export class Chart {
     // One after the other: plotly.js does not take a second drawing while the first is at work.
     this.queue = this.queue.then(async () => {
       if (!this.element.isConnected && this.drawn) return;
+      if (!this.drawn) fill(this.plot);
       await Plotly.react(this.plot, traces, this.layout(layout), { ...CONFIG, responsive: true });
       this.drawn = true;
     });
