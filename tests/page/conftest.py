@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -76,6 +77,50 @@ class WatchedPage:
         """Open the chart page, and wait for its first view."""
         self.page.goto(f"{self.url}/{hash}")
         self.page.wait_for_selector("#view section")
+
+    def until(self, expression: str, within_s: float = 30.0):
+        """The value of an expression of JavaScript once it is truthy.
+
+        Playwright's own `wait_for_function` evaluates text inside the page, which the page's policy forbids.
+        """
+        end = time.monotonic() + within_s
+        while not (value := self.page.evaluate(expression)):
+            assert time.monotonic() < end, f"never: {expression}\n{self.page.inner_text('#view')[:2000]}"
+            time.sleep(0.02)
+        return value
+
+    def text(self, selector: str) -> str:
+        """What stands in the first element that fits."""
+        return self.page.locator(selector).first.inner_text()
+
+    def settled(self) -> None:
+        """Until surrogate and exact core have answered all that the explorer asks."""
+        self.until("document.querySelector('.findings')?.innerText.includes('Boundary exact')")
+        self.until("!document.querySelector('.findings').innerText.includes('at work')", 60.0)
+
+    def slide(self, name: str, value: float, *, release: bool = True) -> None:
+        """Move a slider as a hand does."""
+        self.page.evaluate(
+            """([name, value, release]) => {
+              const slider = document.querySelector(`[data-slider="${name}"]`);
+              slider.value = value;
+              slider.dispatchEvent(new Event("input", {bubbles: true}));
+              if (release) slider.dispatchEvent(new Event("change", {bubbles: true}));
+            }""",
+            [name, value, release],
+        )
+
+    def violations(self) -> list[str]:
+        """What axe-core finds that is serious or critical."""
+        from axe_playwright_python.sync_playwright import Axe
+
+        found = Axe().run(self.page).response["violations"]
+        return [
+            f"{v['id']}: {n['html'][:200]}"
+            for v in found
+            if v["impact"] in ("serious", "critical")
+            for n in v["nodes"]
+        ]
 
     def check(self) -> None:
         unexpected = [m for m in self.console if not any(part in m for part in self.expected)]

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import httpx
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from nearby_models import nearby
 from served_process import ServedProcess, free_port
 
@@ -49,10 +48,10 @@ def service(data) -> Iterator[ServedProcess]:
 
 def models(opened, service: ServedProcess, **context):
     """The page with its view of models."""
-    page = opened(service, **context).page
-    page.get_by_role("link", name="Models").click()
-    page.wait_for_selector(".models-table")
-    return page
+    watched = opened(service, **context)
+    watched.page.get_by_role("link", name="Models").click()
+    watched.page.wait_for_selector(".models-table")
+    return watched
 
 
 def panel(page, name: str):
@@ -60,14 +59,14 @@ def panel(page, name: str):
 
 
 def test_the_active_model_is_told_in_words_and_figures(opened, service, pictures):
-    page = models(opened, service)
+    page = models(opened, service).page
     assert page.get_by_role("heading", name=f"The model that answers, {SHIPPED_ID}").is_visible()
     made = panel(page, "What it was made of").inner_text()
     assert "245,760 labels" in made and "3 residual blocks of 192 units" in made and "calibrated by" in made
     assert "1.3 to 6" in made and "0.045 to 0.9" in made
     promised = panel(page, "Certificate").locator("tbody tr").all_inner_texts()
     assert len(promised) == sum(len(one["table"]) for one in CARD["certificates"])
-    assert [cell for cell in promised[3].split("\t")] == ["0.05 %", "1.17 %", "10", "100,210", "0", "0 %"]
+    assert promised[3].split("\t") == ["0.05 %", "1.17 %", "10", "100,210", "0", "0 %"]
     tables = panel(page, "Evaluation").locator("table")
     assert tables.count() == 2 and "Permanent contact" in tables.first.locator("caption").inner_text()
     arcs = tables.nth(1).locator("tbody tr").all_inner_texts()
@@ -76,7 +75,7 @@ def test_the_active_model_is_told_in_words_and_figures(opened, service, pictures
 
 
 def test_the_learning_curve_is_that_of_the_card(opened, service, tmp_path):
-    page = models(opened, service)
+    page = models(opened, service).page
     page.wait_for_selector(".plot .scatterlayer .trace >> nth=1", state="attached")
     with page.expect_download() as download:
         page.get_by_role("button", name="Learning curve: save the figures as CSV").click()
@@ -93,7 +92,7 @@ def test_the_learning_curve_is_that_of_the_card(opened, service, tmp_path):
 def test_audits_are_counted_while_one_looks_and_an_alarm_of_another_model_is_shown_there(
     opened, service, data
 ):
-    page = models(opened, service)
+    page = models(opened, service).page
     audit = panel(page, "Audit")
     blade = blade_to_dict(example_blade("nasa_rotor_37"))
     question = {
@@ -140,7 +139,7 @@ def test_a_worse_model_is_refused_with_reasons_forced_only_apart_from_that_and_r
     page.get_by_role("heading", name=f"The model that answers, {worse}").wait_for()
     history = panel(page, "History")
     assert "promoted by force" in history.inner_text() and reasons[0] in history.inner_text()
-    page.wait_for_function(f"document.getElementById('about').textContent.includes('{worse}')")
+    watched.until(f"document.getElementById('about').textContent.includes('{worse}')")
     page.get_by_role("button", name="Roll back…").click()
     dialog.get_by_role("button", name="Roll back", exact=True).click()
     dialog.get_by_text(f"{SHIPPED_ID} is the active model now, after {worse}.").wait_for()
@@ -169,19 +168,14 @@ def test_who_may_not_exchange_models_is_not_offered_it(opened, tmp_path):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_it_can_be_read_and_used_by_other_means(opened, service, data, pictures, theme):
-    page = models(opened, service, color_scheme=theme)
+    watched = models(opened, service, color_scheme=theme)
+    page = watched.page
     page.wait_for_selector(".plot .scatterlayer .trace", state="attached")
     page.get_by_role("button", name=f"Look at {data[1]}").click()
     panel(page, "Audit").get_by_role("alert").wait_for()
 
-    def serious() -> list[str]:
-        found = Axe().run(page).response["violations"]
-        return [
-            f"{v['id']}: {v['nodes'][0]['html']}" for v in found if v["impact"] in ("serious", "critical")
-        ]
-
-    assert serious() == []
+    assert watched.violations() == []
     page.set_viewport_size({"width": 800, "height": 1000})
     page.screenshot(path=pictures / f"models-{theme}-800.png", full_page=True)
     page.get_by_role("button", name=f"Make {data[1]} the active model").click()
-    assert serious() == []
+    assert watched.violations() == []

@@ -28,18 +28,21 @@ export class BladeFiles {
         h("label", { class: "as-button" }, "choose files", input), " ", h("label", { class: "as-button" }, "choose a folder", folder)),
       this.list,
     );
-    this.element.addEventListener("dragover", (event) => {
-      event.preventDefault();
-      this.element.classList.add("over");
-    });
-    this.element.addEventListener("dragleave", () => this.element.classList.remove("over"));
-    this.element.addEventListener("drop", async (event) => {
-      event.preventDefault();
-      this.element.classList.remove("over");
-      this.add(await droppedFiles(event.dataTransfer));
-    });
     // What could not be sent while the service was away, or with another key.
     events.addEventListener("back", () => this.sendings.filter((one) => one.state === "held").forEach((one) => this.send(one)));
+  }
+
+  /** Take what is dropped anywhere in an element. */
+  takeDrops(area) {
+    const over = (event) => {
+      event.preventDefault();
+      this.element.classList.toggle("over", event.type === "dragover");
+    };
+    for (const name of ["dragover", "dragleave"]) area.addEventListener(name, over);
+    area.addEventListener("drop", async (event) => {
+      over(event);
+      if (!this.element.closest("fieldset:disabled")) this.add(await droppedFiles(event.dataTransfer));
+    });
   }
 
   take(input) {

@@ -47,6 +47,7 @@ export class OrderForm {
         h("p", { class: "row" }, this.submit)));
     this.element = h("div", { class: "order" }, h("h2", { tabIndex: -1 }, "New screening"),
       h("p", { class: "hint" }, "Every blade is screened under every contact, as a job that the service runs to its end whether this page stays open or not."), this.form);
+    this.blades.files.takeDrops(this.element);
     app.onChange((what) => {
       if (what === "designs") this.designsChanged();
       if (what === "unit" || what === "designs") this.speeds.showUnit();

@@ -7,6 +7,7 @@ import { ask } from "../service.js";
 import { canExplore, explore } from "./explore.js";
 import { SmallMaps } from "./small_maps.js";
 import { counted, verdictMark } from "./words.js";
+import { scrollable } from "../scrollable.js";
 
 const ROWS = 50;
 const VERDICTS = ["stable", "unstable at some speed", "not decided"];
@@ -30,7 +31,7 @@ export class Ranking {
     this.sum = h("p", { class: "note" });
     this.fault = h("p", { class: "problem", role: "alert", hidden: true });
     this.body = h("tbody");
-    this.table = h("div", { class: "scroll", role: "region", "aria-label": "Ranking", tabIndex: 0 },
+    this.table = scrollable("Ranking",
       h("table", { class: "ranking" }, this.head = h("thead"), this.body));
     const page = (text, label, to) => h("button", { type: "button", class: "small", "aria-label": label, onclick: () => this.turn(to()) }, text);
     this.pages = h("div", { class: "row no-print", role: "group", "aria-label": "Pages" },
@@ -175,7 +176,7 @@ export class Ranking {
     const head = h("thead", {}, h("tr", {}, ["Place", "From", "Blade", "Why not"].map((text) => h("th", { scope: "col" }, text))));
     const rows = left.map((one) => h("tr", {}, h("td", {}, String(one.index)), h("td", {}, one.source), h("td", {}, one.name || "–"), h("td", {}, one.reason)));
     fill(this.unscreened, h("summary", {}, `${counted(left.length, "blade")} not screened${left.length === 1000 ? " (the first thousand)" : ""}`),
-      h("div", { class: "scroll" }, h("table", {}, head, h("tbody", {}, rows))));
+      scrollable("Blades not screened", h("table", {}, head, h("tbody", {}, rows))));
     this.unscreened.open = open;
   }
 }

@@ -3,6 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number, percent } from "../format.js";
 import { inWords } from "./figures.js";
+import { scrollable } from "../scrollable.js";
 
 /** @param {HTMLElement} place  @param {Object} found of GET /v1/models/{id}/audits */
 export function showAudits(place, found) {
@@ -17,7 +18,7 @@ export function showAudits(place, found) {
     h("p", { class: "hint" }, auditing ? "A sample of what the service answers from the model alone is solved exactly in the background, and held to what the certificate promises."
       : "This service does not audit now (audit_share_of_time is 0); what is shown was counted before, or by others of its kind."),
     state,
-    audits.length ? h("div", { class: "scroll" }, h("table", {}, h("caption", {}, "Audited answers, under each promise"),
+    audits.length ? scrollable("Audited answers", h("table", {}, h("caption", {}, "Audited answers, under each promise"),
       h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Contact"), ["α promised", "Called stable", "of these unstable", "rate", "Called unstable", "of these stable", "Not decided", "Evidence against the promise"].map((text) => h("th", { scope: "col", class: "n" }, text)))),
       h("tbody", {}, audits.map((one) => h("tr", {}, h("th", { scope: "row" }, inWords(one.contact)), cell(percent(one.alpha)),
         cell(number(one.answered_stable)), cell(number(one.false_stable)), cell(one.answered_stable ? percent(one.false_stable / one.answered_stable) : "–"),

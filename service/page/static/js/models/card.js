@@ -3,6 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number } from "../format.js";
 import { inWords } from "./figures.js";
+import { scrollable } from "../scrollable.js";
 
 const RANGES = {
   mode_count: "Number of modes",
@@ -40,7 +41,7 @@ export function showCard(place, { card }) {
   fill(place,
     h("dl", {}, facts.map(([name, told]) => [h("dt", {}, name), h("dd", {}, told)])),
     ranges.length ? [
-      h("div", { class: "scroll" }, h("table", {}, h("caption", {}, `Design space ${space.name ?? ""}: outside it the exact core answers`),
+      scrollable("Design space", h("table", {}, h("caption", {}, `Design space ${space.name ?? ""}: outside it the exact core answers`),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Of the blade and its contact"), h("th", { scope: "col", class: "n" }, "Range"))),
         h("tbody", {}, ranges.map(([name, range]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, range))))))] : null);
 }

@@ -3,6 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number, percent } from "../format.js";
 import { certificates, inWords } from "./figures.js";
+import { scrollable } from "../scrollable.js";
 
 /** @param {HTMLElement} place  @param {Object} card */
 export function showCertificates(place, card) {
@@ -13,7 +14,7 @@ export function showCertificates(place, card) {
   }
   fill(place,
     h("p", { class: "hint" }, "Of the points that the model calls stable at most the share α is unstable: at the confidence stated, for blades drawn from the distribution stated. Points nearer to the boundary than so many spreads of the model are verified by the exact core first."),
-    found.map((one) => h("div", { class: "scroll" }, h("table", {},
+    found.map((one) => scrollable(`Certificate, ${inWords(one.contact)}`, h("table", {},
       h("caption", {}, `${capital(inWords(one.contact))}: ${percent(one.confidence)} confidence, distribution ${one.distribution}, ${number(one.points)} points`),
       h("thead", {}, h("tr", {}, ["α promised", "Verified exactly", "Nearer than [spreads]", "Called stable", "of these unstable", "False unstable"].map((text) => h("th", { scope: "col", class: "n" }, text)))),
       h("tbody", {}, one.table.map((line) => h("tr", {},

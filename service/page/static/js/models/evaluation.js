@@ -3,6 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number, percent } from "../format.js";
 import { evaluations, inWords, otherRate, rate } from "./figures.js";
+import { scrollable } from "../scrollable.js";
 
 const KINDS = [
   ["auto", "As the service answers, verified near the boundary"],
@@ -20,7 +21,7 @@ export function showEvaluation(place, card) {
   }
   fill(place,
     h("p", { class: "hint" }, "Held-out points of known verdict. False stable: called stable and unstable, the mistake that costs a blade. Hard points lie close to the boundary."),
-    found.map(([contact, one]) => h("div", { class: "scroll" }, h("table", {},
+    found.map(([contact, one]) => scrollable(`Evaluation, ${inWords(contact)}`, h("table", {},
       h("caption", {}, `${inWords(contact)[0].toUpperCase()}${inWords(contact).slice(1)}, at α = ${percent(one.alpha)}; error of the boundary: median ${percent(one.median_boundary_error)}, 99 of 100 within ${percent(one.p99_boundary_error)}`),
       h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Answered"), ["Points", "False stable", "rate", "False unstable", "rate", "Verified exactly"].map((text) => h("th", { scope: "col", class: "n" }, text)))),
       h("tbody", {}, KINDS.filter(([name]) => one[name]).map(([name, words]) => {

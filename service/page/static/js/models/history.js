@@ -2,6 +2,7 @@
 
 import { fill, h } from "../dom.js";
 import { moment } from "../batches/words.js";
+import { scrollable } from "../scrollable.js";
 
 /**
  * @param {HTMLElement} place
@@ -13,7 +14,7 @@ export function showHistory(place, changes) {
     return;
   }
   const head = ["When", "What", "Active from then on", "Before", "Against it"];
-  fill(place, h("div", { class: "scroll" }, h("table", {}, h("caption", { class: "hidden" }, "Changes of the active model, newest first"),
+  fill(place, scrollable("Changes of the active model", h("table", {}, h("caption", { class: "hidden" }, "Changes of the active model, newest first"),
     h("thead", {}, h("tr", {}, head.map((text) => h("th", { scope: "col" }, text)))),
     h("tbody", {}, [...changes].reverse().map((change) => h("tr", {}, h("td", {}, moment(change.at)), h("td", {}, change.forced ? `${change.event} by force` : change.event),
       h("td", {}, h("code", {}, change.model)), h("td", {}, change.was ? h("code", {}, change.was) : "–"),

@@ -3,6 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number, percent } from "../format.js";
 import { certificates, evaluations, keyFigures } from "./figures.js";
+import { scrollable } from "../scrollable.js";
 
 /**
  * @param {HTMLElement} place
@@ -21,7 +22,7 @@ export function showModels(place, models, looked, { look, promote }) {
     })),
     { title: "Version", cells: models.map(({ card }) => [card.code_version, card.calibrated_by].filter(Boolean).at(-1) ?? "–") },
   ];
-  fill(place, h("div", { class: "scroll", role: "region", "aria-label": "Models", tabIndex: 0 }, h("table", { class: "models-table" },
+  fill(place, scrollable("Key figures of the models", h("table", { class: "models-table" },
     h("caption", { class: "hidden" }, "Models and their key figures"),
     h("thead", {}, h("tr", {}, h("td"), models.map((model) => h("th", { scope: "col", class: model.id === looked ? "looked" : "" },
       h("code", {}, model.id), h("span", { class: "hint" }, model.active ? "answers now" : model.damage ? `damaged: ${model.damage}` : model.card.made ?? ""),
