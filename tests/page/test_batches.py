@@ -81,7 +81,7 @@ def test_a_batch_is_asked_for_watched_and_ranked(opened, service, pictures):
     page.get_by_label("generic-compressor-blade").check()
     page.screenshot(path=pictures / "batches-form.png", full_page=True)
     assert page.get_by_text("2 blades chosen.").is_visible()
-    screen(page, {"Name": "as a user would", "K_e of the liner": "9000", "Margin at least": "50"})
+    screen(page, {"Name": "as a user would", "Kₑ of the liner": "9000", "Margin at least": "50"})
     page.wait_for_selector(DONE)
     assert page.get_by_role("heading", name="as a user would").is_visible()
     job = the_job(service, "as a user would")
@@ -230,11 +230,11 @@ def test_what_is_refused_is_said_at_its_field_and_nothing_typed_is_lost(opened, 
     watched.expected.append("422")
     page = watched.page
     page.get_by_role("link", name="Batches").click()
-    screen(page, {"Name": "too stiff a liner", "K_e of the liner": "30000"})
+    screen(page, {"Name": "too stiff a liner", "Kₑ of the liner": "30000"})
     fault = page.locator(".order .problem:visible")
     fault.wait_for()
     assert "ke_liner" in fault.inner_text() and "give at most ke_max, 25000 N/m" in fault.inner_text()
-    field = page.get_by_label("K_e of the liner")
+    field = page.get_by_label("Kₑ of the liner")
     assert field.get_attribute("aria-invalid") == "true"
     assert field.evaluate("field => field === document.activeElement")
     assert page.get_by_label("Name", exact=True).input_value() == "too stiff a liner"
@@ -261,27 +261,20 @@ def test_a_batch_is_cancelled_and_its_rest_is_run(opened, service, tmp_path):
     page.wait_for_selector(".job-view .state[data-state=cancelled]")
 
 
-def test_a_batch_is_followed_over_a_restart_of_the_service(opened, tmp_path):
-    service = ServedProcess(
-        tmp_path, free_port(), {"engine_workers": "1", "min_free_bytes": "0", "drain_s": "0"}
-    )
+def test_a_batch_is_followed_over_a_restart_of_the_service(opened, service):
+    watched = opened(service)
+    watched.expected += ["ERR_", "Failed to load resource"]
+    page = watched.page
+    page.get_by_role("link", name="Batches").click()
+    page.get_by_label("generic-compressor-blade").check()
+    screen(page, {"Name": "over a restart"}, points=40)
+    page.wait_for_selector(".job-view")
+    service.kill()
+    page.locator("#banner").wait_for()
     service.start()
-    try:
-        watched = opened(service)
-        watched.expected += ["ERR_", "Failed to load resource"]
-        page = watched.page
-        page.get_by_role("link", name="Batches").click()
-        page.get_by_label("generic-compressor-blade").check()
-        screen(page, {"Name": "over a restart"}, points=40)
-        page.wait_for_selector(".job-view")
-        service.kill()
-        page.locator("#banner").wait_for()
-        service.start()
-        page.locator("#banner").wait_for(state="hidden")
-        page.wait_for_selector(DONE)
-        rows(watched, 6)
-    finally:
-        service.kill()
+    page.locator("#banner").wait_for(state="hidden")
+    page.wait_for_selector(DONE)
+    rows(watched, 6)
 
 
 def test_a_reader_sees_batches_and_is_told_why_none_can_be_started(opened, tmp_path):

@@ -15,10 +15,10 @@ export class OrderForm {
     this.blades = new BladeChoice(app, () => this.told());
     this.contacts = new ContactChoice(app);
     this.speeds = new SpeedChoice(app);
-    this.keMax = new Field({ label: "K_e up to", unit: "N/m", min: 0, hint: "Largest stiffness of the maps." });
-    this.keLiner = new Field({ label: "K_e of the liner", unit: "N/m", min: 0, empty: "none", hint: "Verdict and margin are given at it." });
-    this.margin = new Field({ label: "Margin at least", unit: "%", factor: 100, empty: "any", hint: "Of the smallest K_e that destabilises, above the liner's." });
-    this.leastKe = new Field({ label: "Smallest K_e at least", unit: "N/m", min: 0, empty: "any", hint: "Nothing below it may destabilise." });
+    this.keMax = new Field({ label: "Kₑ up to", unit: "N/m", min: 0, hint: "Largest stiffness of the maps." });
+    this.keLiner = new Field({ label: "Kₑ of the liner", unit: "N/m", min: 0, empty: "none", hint: "Verdict and margin are given at it." });
+    this.margin = new Field({ label: "Margin at least", unit: "%", factor: 100, empty: "any", hint: "Of the smallest Kₑ that destabilises, above the liner's." });
+    this.leastKe = new Field({ label: "Smallest Kₑ at least", unit: "N/m", min: 0, empty: "any", hint: "Nothing below it may destabilise." });
     this.share = new Field({ label: "Unstable share at most", unit: "%", factor: 100, min: 0, empty: "any", hint: "Of the map's points." });
     this.speedPoints = new Field({ label: "Speeds in each map", whole: true, min: 2 });
     this.kePoints = new Field({ label: "Stiffnesses in each map", whole: true, min: 2 });

@@ -11,7 +11,7 @@ import { scrollable } from "../scrollable.js";
 
 const ROWS = 50;
 const VERDICTS = ["stable", "unstable at some speed", "not decided"];
-const CRITERIA = { least_ke: "smallest K_e", least_margin: "margin", most_unstable_share: "unstable share" };
+const CRITERIA = { least_ke: "smallest Kₑ", least_margin: "margin", most_unstable_share: "unstable share" };
 
 export class Ranking {
   /** @param {App} app */
@@ -185,7 +185,7 @@ const has = (results, name) => results.some((row) => row[name] !== null);
 
 function heading(unit, results) {
   const col = (text, more = "") => h("th", { scope: "col", class: more }, text);
-  return h("tr", {}, col("Rank", "n"), col("Map"), col("Blade"), col("Contact"), col("Smallest K_e that destabilises [N/m]", "n"), col(`at rotor speed [${unit.symbol}]`, "n"),
+  return h("tr", {}, col("Rank", "n"), col("Map"), col("Blade"), col("Contact"), col("Smallest Kₑ that destabilises [N/m]", "n"), col(`at rotor speed [${unit.symbol}]`, "n"),
     col("Chatter [Hz]", "n"), has(results, "verdict") && col(`At the liner${liner(results)}`),
     has(results, "meets_criteria") && col("Criteria"), col("Unstable share of the map", "n"));
 }

@@ -5,6 +5,9 @@ import { number, percent } from "../format.js";
 import { inWords } from "./figures.js";
 import { scrollable } from "../scrollable.js";
 
+// Evidence beyond this says no more.
+const LARGE = 1e6;
+
 /** @param {HTMLElement} place  @param {Object} found of GET /v1/models/{id}/audits */
 export function showAudits(place, found) {
   const { audits, auditing, alarm, alarm_at: limit } = found;
@@ -23,7 +26,8 @@ export function showAudits(place, found) {
       h("tbody", {}, audits.map((one) => h("tr", {}, h("th", { scope: "row" }, inWords(one.contact)), cell(percent(one.alpha)),
         cell(number(one.answered_stable)), cell(number(one.false_stable)), cell(one.answered_stable ? percent(one.false_stable / one.answered_stable) : "–"),
         cell(number(one.answered_unstable)), cell(number(one.false_unstable)), cell(number(one.undecided)),
-        cell(one.alarmed_at ? `${number(one.evidence, 3)}, alarm since ${one.alarmed_at.slice(0, 10)}` : number(one.evidence, 3))))))) : null,
+        h("td", { class: "n" }, one.evidence > LARGE ? "over a million" : number(one.evidence, 3),
+          one.alarmed_at && h("span", { class: "hint" }, `alarm since ${one.alarmed_at.slice(0, 10)}`))))))) : null,
     audits.length ? h("p", { class: "hint" }, `An alarm is raised when the evidence reaches ${number(limit)}, which a promise that is kept ever does with a chance of 1 %. An alarm stays.`) : null);
 }
 

@@ -16,8 +16,8 @@ const RANGES = {
 };
 const LARGEST = {
   damping_spread: "Damping ratio of a mode over their geometric mean, or the inverse",
-  largest_kappa: "Largest K_e over modal stiffness at the contact, permanent contact",
-  largest_kappa_with_arcs: "Largest K_e over modal stiffness at the contact, arcs of contact",
+  largest_kappa: "Largest Kₑ over modal stiffness at the contact, permanent contact",
+  largest_kappa_with_arcs: "Largest Kₑ over modal stiffness at the contact, arcs of contact",
 };
 
 /** @param {HTMLElement} place  @param {Object} model of GET /v1/models */

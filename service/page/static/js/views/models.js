@@ -13,7 +13,7 @@ import { inWords, isSilent } from "../problem_note.js";
 import { ask, events } from "../service.js";
 
 // Counts of audits come in while one looks.
-const LOOK_EVERY_S = 10;
+const LOOK_EVERY_S = 5;
 
 export class ModelsView {
   /** @param {App} app */
@@ -71,6 +71,7 @@ export class ModelsView {
       this.showState(found);
       this.showAll();
       showHistory(this.history.place, history.changes);
+      this.back.disabled = history.changes.length < 2; // there is nothing to return to
       await this.loadAudits();
     } catch (error) {
       this.refuse(error);
