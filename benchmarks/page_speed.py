@@ -26,6 +26,7 @@ CONTACTS = {"permanent contact": "All round", "two arcs of contact": "Two quarte
 MEASURES = {
     "map of 120 × 120 by the surrogate": "map on screen",
     "exact boundary": "exact boundary on screen",
+    "exact boundary, at more speeds": "finer boundary on screen",
     "map re-verified": "verified map on screen",
 }
 _DRAG = """async ([from, to, steps]) => {
@@ -49,13 +50,19 @@ class Opening:
 
 def table() -> Table:
     """Opening, and both contacts."""
-    out = Table(title=f"The chart page, rotor 37, both edges; {DRAGS} drags of the damping of {STEPS} steps each")
+    out = Table(
+        title=f"The chart page, rotor 37, both edges; {DRAGS} drags of the damping of {STEPS} steps each"
+    )
     for column in ("what", "median", "95 % within", "largest", "times"):
         out.add_column(column, justify="left" if column == "what" else "right")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
         sys.exit("chromium = not found: install it (Debian: apt install chromium)")
-    with TemporaryDirectory() as folder, ServiceProcess(Path(folder)) as service, sync_playwright() as playwright:
+    with (
+        TemporaryDirectory() as folder,
+        ServiceProcess(Path(folder)) as service,
+        sync_playwright() as playwright,
+    ):
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_page(viewport={"width": 1440, "height": 1000})
         opening = _open(page, service.url)
@@ -73,7 +80,11 @@ def table() -> Table:
                 _settle(page)
             for what, measure in MEASURES.items():
                 times = np.array(_durations(page, measure))
-                told = [f"{value:.0f} ms" for value in (np.median(times), np.quantile(times, 0.95), times.max())]
+                if not len(times):
+                    continue
+                told = [
+                    f"{value:.0f} ms" for value in (np.median(times), np.quantile(times, 0.95), times.max())
+                ]
                 out.add_row(what, *told, str(len(times)))
         browser.close()
     return out

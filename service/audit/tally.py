@@ -10,6 +10,8 @@ from training.audit_evidence import log_evidence
 
 # The chance that a promise that is kept ever raises an alarm.
 FALSE_ALARM = 0.01
+# Of the evidence, where it is told as it is: beyond what a double can hold it is an alarm all the same.
+LARGEST_LOG = 700.0
 
 
 @dataclass(frozen=True, order=True)

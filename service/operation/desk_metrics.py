@@ -10,6 +10,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from service.audit.auditor import Auditor
+from service.audit.tally import LARGEST_LOG
 from service.rest.active_model import ActiveModel
 from service.rest.limits import WorkQueue
 from training.served_answers import ServedAnswers
@@ -124,8 +125,9 @@ def _of_audit(auditor: Auditor, model: str | None) -> Iterable[Metric]:
     for promise, seen in auditor.known.items():
         if promise.model == model:  # of others it is history, and in the database
             labels = (promise.model, promise.contact, f"{promise.alpha:g}")
-            # Beyond what a double can hold it is an alarm all the same.
-            evidence.add_metric(labels, float(np.exp(min(seen.tally.log_evidence(promise.alpha), 700.0))))
+            evidence.add_metric(
+                labels, float(np.exp(min(seen.tally.log_evidence(promise.alpha), LARGEST_LOG)))
+            )
             alarm.add_metric(labels, float(seen.alarmed_at is not None))
     passed_over = CounterMetricFamily(
         "rubscreen_audit_passed_over", "Answers drawn and not audited.", auditor.passed_over

@@ -11,6 +11,8 @@ from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+from service.screening import html_axes, html_page
+
 FOLDER = Path(__file__).parent / "static"
 PATH = "/page/"
 # plotly.js puts these on the picture of a heat map, as attributes; nothing else may carry a style of its own.
@@ -20,6 +22,8 @@ _PLOTLY_STYLES = (
     "image-rendering: -webkit-optimize-contrast; image-rendering: optimize-contrast; "
     "image-rendering: crisp-edges; image-rendering: pixelated; ",
 )
+# A report opened in a tab of its own comes from the page and so is under its policy; these are its styles.
+_REPORT_STYLES = (html_page.STYLE, html_axes.PIXELATED)
 
 
 def _hash(text: str) -> str:
@@ -30,7 +34,7 @@ POLICY = "; ".join(
     (
         "default-src 'none'",
         "script-src 'self'",
-        f"style-src 'self' 'unsafe-hashes' {' '.join(map(_hash, _PLOTLY_STYLES))}",
+        f"style-src 'self' 'unsafe-hashes' {' '.join(map(_hash, _PLOTLY_STYLES + _REPORT_STYLES))}",
         "img-src 'self' blob: data:",
         "connect-src 'self'",
         "base-uri 'none'",

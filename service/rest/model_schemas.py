@@ -44,3 +44,33 @@ class ModelHistory(BaseModel):
     """Which model was active when, oldest first."""
 
     changes: list[Activation]
+
+
+class AuditReply(BaseModel):
+    """What audits have found under one line of a certificate: counts of answers, each solved exactly."""
+
+    contact: str = Field(description="Class of contact: permanent or arcs.")
+    alpha: float = Field(
+        description="What was promised: the rate of unstable points among those called stable."
+    )
+    answered_stable: int
+    false_stable: int = Field(description="Of these, unstable; the promise is about them.")
+    answered_unstable: int
+    false_unstable: int = Field(description="Of these, stable; nothing is promised of them.")
+    undecided: int = Field(description="Not decided to tolerance by the exact core, and not counted above.")
+    evidence: float = Field(description="Against the promise; an alarm is raised at `alarm_at`.")
+    alarmed_at: str | None = Field(
+        description="UTC, ISO 8601; null where the promise was never contradicted."
+    )
+
+
+class ModelAudits(BaseModel):
+    """What audits in the background have found about a model, here and on other replicas."""
+
+    model: str
+    auditing: bool = Field(description="Whether this service audits at all; what was found before stays.")
+    alarm: bool = Field(description="Whether a promise was contradicted. An alarm stays.")
+    alarm_at: float = Field(
+        description="Evidence that a promise which is kept ever reaches with a chance of 1 %: 100."
+    )
+    audits: list[AuditReply] = Field(description="One a promise of which answers were audited.")

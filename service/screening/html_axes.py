@@ -11,6 +11,7 @@ import numpy as np
 from service.screening.html_page import data_uri
 from service.screening.html_png import indexed_png
 
+PIXELATED = "image-rendering:pixelated"
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 10.0, 40.0, 38.0
 
 
@@ -49,7 +50,7 @@ class Chart:
         right, bottom = self._x(high + wide / 2), self._y(-tall / 2)
         self._inside.append(
             f'<image x="{x:.2f}" y="{y:.2f}" width="{right - x:.2f}" height="{bottom - y:.2f}" '
-            'preserveAspectRatio="none" style="image-rendering:pixelated" '
+            f'preserveAspectRatio="none" style="{PIXELATED}" '
             f'href="{data_uri(indexed_png(shades[::-1], palette))}"/>'
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import logging
 import threading
@@ -24,7 +25,8 @@ from service.audit.auditor import MOST_WAITING, Auditor
 from service.audit.tally import Promise, Tally
 from service.operation.logs import _handler, bound
 from service.records import audits
-from service.records.database import Database, database_url
+from service.records.database import Database, database_url, open_database
+from service.rest.model_schemas import ModelAudits
 from service.settings import Settings
 from training.confident_answers import ConfidentAnswers
 from training.contact_class import ARCS, PERMANENT
@@ -100,6 +102,9 @@ def test_a_bad_model_promoted_by_force_raises_the_alarm_within_2000_audited_answ
         wrong = metric(http, "rubscreen_audit_false_stable_total", model=bad, contact=PERMANENT)
         assert audited <= 2_000 and wrong >= 2
         assert metric(http, "rubscreen_audit_evidence", model=bad) >= 100
+        told = ModelAudits.model_validate(http.get(f"/v1/models/{bad}/audits").json())
+        assert told.auditing and told.alarm and [line.contact for line in told.audits] == [PERMANENT]
+        assert told.audits[0].false_stable == wrong and told.audits[0].evidence >= told.alarm_at
         ready = http.get("/readyz")
         # For information: an alarm must not leave the office without any answer.
         assert ready.status_code == 200
@@ -112,6 +117,7 @@ def test_a_bad_model_promoted_by_force_raises_the_alarm_within_2000_audited_answ
     with serving(create_app(again)) as url, httpx.Client(base_url=url, timeout=60.0) as http:
         assert metric(http, "rubscreen_audit_alarm", model=bad) == 1
         assert not http.get("/readyz").json()["checks"]["audit"]["ok"]
+        assert http.get(f"/v1/models/{bad}/audits").json()["audits"][0]["alarmed_at"].endswith("Z")
         promote(nearby(folder).id, folder, force=True, check=lambda *models: Remeasured((), {}))
         # The alarm was about that model; the next one starts with a clean sheet.
         until(lambda: http.get("/readyz").json()["checks"]["audit"]["ok"], "the alarm never went")
@@ -271,6 +277,20 @@ def test_an_answer_that_cannot_be_solved_stops_nothing(monkeypatch, caplog):
     assert auditor.passed_over == 8 and "singular" in caplog.text
 
 
+def test_what_was_audited_before_is_told_where_nothing_is_audited_now(serving, tmp_path):
+    shipped = load_model().id
+    with contextlib.closing(open_database(tmp_path, None)) as database:
+        mine, others = Promise(shipped, PERMANENT, 5e-4), Promise("another", PERMANENT, 5e-4)
+        audits.add(database, {mine: Tally(answered_stable=900, undecided=2), others: Tally(7, 7)})
+    off = Settings(data_folder=tmp_path, audit_share_of_time=0.0, run_jobs=False)
+    with serving(create_app(off)) as url, httpx.Client(base_url=url, timeout=60.0) as http:
+        told = http.get(f"/v1/models/{shipped}/audits").json()
+        assert not told["auditing"] and not told["alarm"] and len(told["audits"]) == 1
+        assert (told["audits"][0]["answered_stable"], told["audits"][0]["undecided"]) == (900, 2)
+        assert told["audits"][0]["evidence"] < 1 and told["alarm_at"] == 100
+        assert http.get("/v1/models/0123456789abcdef/audits").status_code == 404
+
+
 def test_probes_are_not_audited(serving):
     with serving(create_app(settings(None))) as url, httpx.Client(base_url=url, timeout=60.0) as http:
         assert http.get("/readyz").json()["checks"]["audit"]["ok"]
@@ -284,4 +304,6 @@ def test_nothing_is_audited_where_it_is_turned_off(serving, off):
         http.post("/v1/stability", json=next(questions(1, seed=5)))
         assert "audit" not in http.get("/readyz").json()["checks"]
         assert "rubscreen_audit" not in http.get("/metrics").text
+        told = http.get(f"/v1/models/{load_model().id}/audits").json()
+        assert (told["auditing"], told["alarm"], told["audits"]) == (False, False, [])
         assert not any(thread.name == "audit" for thread in threading.enumerate())

@@ -4,18 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from datetime import UTC, datetime
+from math import exp
 from pathlib import Path
 
 from fastapi import APIRouter
 from starlette.requests import Request
 
 from sdm_core.errors import InvalidInput
+from service.audit.tally import FALSE_ALARM, LARGEST_LOG, Promise
+from service.records import audits
+from service.records.audits import Audited
 from service.rest.access import ADMIN, READ
 from service.rest.body import parsed
 from service.rest.desk import Desk
 from service.rest.errors import ModelNotChanged, NoSuchModel, PromotionNotAllowed
 from service.rest.known_query import KNOWN_QUERY
-from service.rest.model_schemas import Activation, ModelChange, ModelHistory, PromotionQuestion
+from service.rest.model_schemas import (
+    Activation,
+    AuditReply,
+    ModelAudits,
+    ModelChange,
+    ModelHistory,
+    PromotionQuestion,
+)
 from service.rest.models_folder import models_folder
 from service.rest.openapi import problems, request_body
 from service.rest.questions import read_question
@@ -54,6 +66,31 @@ def one_model(request: Request, model_id: str) -> Model:
     return Model(id=found.id, active=found.active, card=found.card, damage=found.damage)
 
 
+@router.get("/models/{model_id}/audits", responses=problems(404, 422, 500, 503))
+def model_audits(request: Request, model_id: str) -> ModelAudits:
+    """What audits of its confident answers have counted, as of a second ago or so, for each promise."""
+    desk = the_desk(request)
+    _check_there(desk, model_id)
+    known = _audited(desk)
+    mine = sorted((promise, seen) for promise, seen in known.items() if promise.model == model_id)
+    return ModelAudits(
+        model=model_id,
+        auditing=desk.auditor is not None,
+        alarm=any(seen.alarmed_at is not None for _, seen in mine),
+        alarm_at=1.0 / FALSE_ALARM,
+        audits=[
+            AuditReply(
+                contact=promise.contact,
+                alpha=promise.alpha,
+                **asdict(seen.tally),
+                evidence=exp(min(seen.tally.log_evidence(promise.alpha), LARGEST_LOG)),
+                alarmed_at=_utc(seen.alarmed_at),
+            )
+            for promise, seen in mine
+        ],
+    )
+
+
 @router.post(
     "/models/{model_id}/promote",
     dependencies=[ADMIN],
@@ -82,6 +119,20 @@ async def roll_back(request: Request) -> ModelChange:
     """Make the surrogate active again that was before the active one; once more, the one before that."""
     desk = the_desk(request)
     return await desk.work.run(lambda: _changed(desk, promotion.rollback), request)
+
+
+def _audited(desk: Desk) -> dict[Promise, Audited]:
+    """Of the auditor, or where this service has none, what others have left in the database."""
+    if desk.auditor is not None:
+        return desk.auditor.known
+    return {} if desk.database is None else audits.read(desk.database)
+
+
+def _utc(at: datetime | None) -> str | None:
+    """As text; SQLite keeps no time zone."""
+    if at is None:
+        return None
+    return (at if at.tzinfo else at.replace(tzinfo=UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
 
 
 def _check_there(desk: Desk, model_id: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from typing import Annotated
 from urllib.parse import urlencode
@@ -14,9 +14,11 @@ from fastapi import APIRouter, Header, Query
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
+from sdm_core.blade import blade_to_dict
 from sdm_core.errors import InvalidInput
 from service.jobs.job import SCREENING, Job
 from service.jobs.screening import pictures
+from service.jobs.screening.chunk_content import ScreenedBlade
 from service.jobs.screening.rankings import Ranking
 from service.jobs.screening.results import SCHEMA, to_csv, to_parquet, to_rows
 from service.rest import replies
@@ -216,6 +218,24 @@ async def screening_report(request: Request, job_id: str, sheets: str | None = N
 
 
 @router.get(
+    "/{job_id}/blades/{index}",
+    response_class=Response,
+    responses={
+        200: {"content": {JSON: {"schema": {"type": "object", "title": "Blade file"}}}},
+        **problems(404, 422, 500, 503),
+    },
+    dependencies=[READ],
+)
+async def screened_blade(request: Request, job_id: str, index: str) -> Response:
+    """The blade file (`rubscreen/blade/1`) of a screened blade; of a profile, what was built of it."""
+
+    def make(blade: ScreenedBlade) -> bytes:
+        return replies.to_json(blade_to_dict(blade.blade))
+
+    return await _of_blade(request, job_id, index, make, JSON)
+
+
+@router.get(
     "/{job_id}/blades/{index}/map.png",
     response_class=Response,
     responses={200: {"content": {PNG: _BINARY}}, **problems(404, 422, 500, 503)},
@@ -223,7 +243,11 @@ async def screening_report(request: Request, job_id: str, sheets: str | None = N
 )
 async def screening_map(request: Request, job_id: str, index: str, contact: str) -> Response:
     """The stability map of one blade under one contact."""
-    return await _picture(request, job_id, index, contact)
+
+    def make(blade: ScreenedBlade) -> bytes:
+        return pictures.map_chart(pictures.contact_result(blade, contact))
+
+    return await _of_blade(request, job_id, index, make, PNG)
 
 
 @router.get(
@@ -234,21 +258,20 @@ async def screening_map(request: Request, job_id: str, index: str, contact: str)
 )
 async def screening_boundaries(request: Request, job_id: str, index: str) -> Response:
     """The first crossings of one blade under every contact."""
-    return await _picture(request, job_id, index, None)
+    return await _of_blade(request, job_id, index, pictures.boundaries_chart, PNG)
 
 
-async def _picture(request: Request, job_id: str, index: str, contact: str | None) -> Response:
+async def _of_blade(
+    request: Request, job_id: str, index: str, make: Callable[[ScreenedBlade], bytes], form: str
+) -> Response:
     desk, service = the_jobs(request), the_desk(request)
 
-    def make() -> bytes:
+    def answer() -> bytes:
         job = desk.jobs.get(job_id, SCREENING)
         place = checked_limit(index, 10**8, 0, "index", least=0)
-        blade = pictures.screened_blade(desk.jobs.folders.of(job.id), place)
-        if contact is None:
-            return pictures.boundaries_chart(blade)
-        return pictures.map_chart(pictures.contact_result(blade, contact))
+        return make(pictures.screened_blade(desk.jobs.folders.of(job.id), place))
 
-    return Response(await service.work.run(make, request), media_type=PNG)
+    return Response(await service.work.run(answer, request), media_type=form)
 
 
 def _places(ranking: Ranking, asked: dict[str, str | None], contacts: Iterable[str] | None) -> np.ndarray:

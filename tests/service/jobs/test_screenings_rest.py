@@ -163,6 +163,7 @@ def test_a_filter_that_nothing_could_fit_is_refused_with_those_that_could(http, 
         ("POST", "/v1/screenings/{id}/retry"),
         ("GET", "/v1/screenings/{id}/events"),
         ("GET", "/v1/screenings/{id}/report"),
+        ("GET", "/v1/screenings/{id}/blades/0"),
         ("GET", "/v1/screenings/{id}/blades/0/map.png"),
         ("GET", "/v1/screenings/{id}/blades/0/boundaries.png"),
         ("GET", "/v1/trainings"),
@@ -208,6 +209,17 @@ def test_charts_and_report_are_drawn(http, done):
     ):
         missing = http.get(f"{base}/{path}")
         assert (missing.status_code, missing.json()["field"]) == (404, field)
+
+
+def test_the_blade_of_a_result_is_had_as_it_was_screened(http, done):
+    base = f"/v1/screenings/{done['id']}/blades"
+    for index, name in ((0, "nasa_rotor_37"), (1, "generic_compressor_blade")):
+        answer = http.get(f"{base}/{index}")
+        assert answer.status_code == 200 and answer.headers["content-type"] == "application/json"
+        assert answer.json() == blade_to_dict(example_blade(name))
+    for path, status, field in (("2", 404, "blade_index"), ("7", 404, "blade_index"), ("x", 422, "index")):
+        missing = http.get(f"{base}/{path}")
+        assert (missing.status_code, missing.json()["field"]) == (status, field)
 
 
 def test_an_upload_is_screened_like_the_blades_in_it(http, service, done):

@@ -54,7 +54,7 @@ export const askBoundary = (question, signal) =>
   ask("v1/boundary", question, { signal }).then((found) => ({ ...found, speed_hz: question.speed_hz }));
 
 /**
- * Events, each with what it found as detail: "map" ({map, live, since}), "boundary" ({boundary, since}),
+ * Events, each with what it found as detail: "map" ({map, live, since}), "boundary" ({boundary, since, fine: whether one was shown before}),
  * "campbell", "lobes", "unstable" (the share of speeds), "damping", "searching" and "busy" (true or false), "problem" (Problem or null), "outside" (why the
  * surrogate alone does not answer, or null).
  */
@@ -148,11 +148,11 @@ export class Answers extends EventTarget {
       const campbell = ask("v1/campbell", { blade, speed_range_hz: span }, { signal });
       campbell.then((found) => signal.aborted || this.#tell("campbell", found), () => {});
       const [first, ...finer] = how.boundary;
-      const boundaryOf = async (count) => {
+      const boundaryOf = async (count, fine = false) => {
         const speed_hz = evenlyTimed(...span, count);
         const asked = { blade, contact, speed_hz, ke_max: range.ke_max, policy: "exact" };
         const boundary = await askBoundary(asked, signal);
-        if (!signal.aborted) this.#tell("boundary", { boundary, since });
+        if (!signal.aborted) this.#tell("boundary", { boundary, since, fine });
       };
       await boundaryOf(first);
       await campbell;
@@ -163,7 +163,7 @@ export class Answers extends EventTarget {
       const lobes = ask(
         "v1/lobes", { blade, contact, speed_range_hz: span, ke_max: range.ke_max, count: how.lobes }, { signal },
       ).then((found) => signal.aborted || this.#tell("lobes", found.lobes));
-      await Promise.all([map, lobes, ...finer.map(boundaryOf)]);
+      await Promise.all([map, lobes, ...finer.map((count) => boundaryOf(count, true))]);
       if (!contact.arcs && range.ke_liner) {
         const { ke_max, ke_liner } = range;
         const found = await ask("v1/lobes", { blade, contact, speed_range_hz: span, ke_max, ke_liner, count: 1 }, { signal });

@@ -17,12 +17,14 @@ export class App extends EventTarget {
   point = null;
   /** Id of the simulation that is looked at; null for none. */
   simulation = null;
+  /** Identifier of the screening that is open; null for none. */
+  job = null;
 
   get unit() {
     return new SpeedUnit(this.unitName, this.active?.firstHz ?? 1);
   }
 
-  /** @param {"design"|"designs"|"range"|"unit"|"theme"|"point"|"caller"} what */
+  /** @param {"design"|"designs"|"range"|"unit"|"theme"|"point"|"caller"|"model"} what */
   changed(what) {
     this.dispatchEvent(new CustomEvent("change", { detail: what }));
   }
@@ -93,7 +95,7 @@ export class App extends EventTarget {
     }));
     return {
       version: 1, view: viewName, designs, active: this.designs.indexOf(this.active), bases, profiles,
-      range: this.range, unit: this.unitName, point: this.point, simulation: this.simulation,
+      range: this.range, unit: this.unitName, point: this.point, simulation: this.simulation, job: this.job,
     };
   }
 
@@ -110,6 +112,7 @@ export class App extends EventTarget {
     this.unitName = state.unit;
     this.point = state.point;
     this.simulation = state.simulation ?? null;
+    this.job = state.job ?? null;
     return state.view;
   }
 }

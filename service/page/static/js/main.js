@@ -173,6 +173,8 @@ async function about() {
   place("about").textContent = `rubscreen ${alive.version}, model ${model?.id ?? "none"}${key}`;
 }
 
+app.onChange((what) => what === "model" && about());
+
 makeTabs();
 makeTheme();
 makeTools();

@@ -12,6 +12,8 @@ export class Problem extends Error {
     this.field = document.field ?? "";
     this.value = document.value ?? "";
     this.remedy = document.remedy ?? "";
+    /** Why a model is not promoted, one text each. */
+    this.reasons = document.reasons ?? [];
   }
 }
 

@@ -74,10 +74,10 @@ export class ExplorerView {
       measured(live ? "map on screen" : "verified map on screen", since);
       this.findings.show({ map: found, live });
     });
-    answers.on("boundary", async ({ boundary, since }) => {
+    answers.on("boundary", async ({ boundary, since, fine }) => {
       this.boundary = { ...boundary, ke_max: this.app.range.ke_max };
       await map.show({ boundary: this.boundary, ...this.#frame() });
-      measured("exact boundary on screen", since);
+      measured(fine ? "finer boundary on screen" : "exact boundary on screen", since);
       this.findings.show({ boundary: this.boundary });
     });
     answers.on("campbell", (found) => campbell.show({ campbell: found, ...this.#frame() }));
