@@ -1,7 +1,7 @@
-"""The chart page in Chromium on the loopback: from a moved slider to the map and the exact boundary on screen.
+"""The chart page in Chromium on the loopback: from a moved slider to map and exact boundary on screen.
 
-Times are the browser's own (User Timing): from the event of the slider to the frame that shows the answer. The
-slider is dragged without a stop, as a hand does it, and then let go.
+Times are the browser's own (User Timing): from the event of the slider to the frame that shows the answer.
+The slider is dragged without a stop, as a hand does it, and then let go.
 """
 
 from __future__ import annotations
