@@ -40,7 +40,7 @@ def browser():
         started.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProcess]:
     """A service with nothing in it, on the loopback, that asks for no keys."""
     process = ServedProcess(tmp_path_factory.mktemp("page"), free_port()).start()

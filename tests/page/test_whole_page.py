@@ -16,7 +16,7 @@ from service.records.database import open_database
 from service.records.keys import KeyStore
 from service.roles import Role
 
-VIEWS = ["Explorer", "Compare", "Time domain", "Batches", "Models"]
+VIEWS = ["Explorer", "Compare"]  # the others are looked at where there is something in them
 LARGEST = 3_000_000  # bytes, of all that opening the page takes
 
 

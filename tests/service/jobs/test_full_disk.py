@@ -16,7 +16,7 @@ from benchmarks.jobs.variants import batch
 from service.jobs.durable_files import free_bytes
 
 SETTINGS = {"engine_workers": 1, "min_free_bytes": 0, "models_poll_s": 0, "drain_s": 0}
-QUESTION = batch(60, 16)
+QUESTION = batch(40, 16)
 
 
 def filled(place: Path) -> Path:
