@@ -106,6 +106,24 @@ def test_a_link_holds_the_state(service, opened):
     assert again.page.input_value("#speed-unit") == "ratio"
 
 
+def test_a_reload_and_the_back_button_lose_nothing(service, opened):
+    page = opened(service)
+    page.settled()
+    page.page.click("text=Trailing edge (TE)")
+    page.slide("damping", 0.5)
+    page.settled()
+    page.page.click("nav >> text=Compare")
+    page.until("document.querySelector('#view section.compare') !== null")
+    page.page.wait_for_timeout(500)
+    page.page.reload()
+    page.until("document.querySelector('#view section.compare') !== null")
+    page.page.go_back()
+    page.settled()
+    assert page.text(".findings .design-title") == "nasa-rotor-37 · TE · damping × 3.162"
+    page.page.go_forward()
+    page.until("document.querySelector('#view section.compare') !== null")
+
+
 def test_a_link_that_was_cut_says_so_and_shows_an_example(service, opened):
     page = opened(service, "page/#s=q1bKUrIyNDI2")
     page.settled()

@@ -24,7 +24,7 @@ export class App extends EventTarget {
     return new SpeedUnit(this.unitName, this.active?.firstHz ?? 1);
   }
 
-  /** @param {"design"|"designs"|"range"|"unit"|"theme"|"point"|"caller"|"model"} what */
+  /** @param {"design"|"designs"|"range"|"unit"|"theme"|"point"|"caller"|"moved"|"model"} what */
   changed(what) {
     this.dispatchEvent(new CustomEvent("change", { detail: what }));
   }

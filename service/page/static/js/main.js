@@ -2,7 +2,7 @@
 
 import { App } from "./app.js";
 import { Design } from "./design/design.js";
-import { fill, h, say } from "./dom.js";
+import { fill, h, say, settled } from "./dom.js";
 import { packed, unpacked } from "./link.js";
 import { Problem, ask, events, key } from "./service.js";
 import { BatchesView } from "./views/batches.js";
@@ -19,6 +19,8 @@ const VIEWS = [
   ["models", "Models", ModelsView],
 ];
 const FIRST_BLADE = "nasa_rotor_37";
+/** Where this tab keeps what it shows, so that a reload shows it again. */
+const TAB = "rubscreen.state";
 
 const app = new App();
 const made = new Map();
@@ -42,7 +44,22 @@ function go(name, { focus = false } = {}) {
   current.show?.();
   if (focus) place("view").focus();
 }
-app.go = (name) => go(name, { focus: true });
+app.go = (name) => step(name, { focus: true });
+
+/** Go to a view, so that the browser's back button leads back from it. */
+function step(name, how) {
+  if (name !== app.viewName) history.pushState({ view: name }, "", location.pathname + location.search);
+  go(name, how);
+  keep();
+}
+
+const keep = settled(300, () => {
+  try {
+    sessionStorage.setItem(TAB, JSON.stringify(app.toState(app.viewName)));
+  } catch {
+    // No room, or storage switched off: a reload then begins with the example.
+  }
+});
 
 function makeTabs() {
   const tab = ([id, title]) =>
@@ -50,7 +67,7 @@ function makeTabs() {
       href: "#", data: { view: id },
       onclick: (event) => {
         event.preventDefault();
-        go(id);
+        step(id);
       },
     }, title));
   fill(place("tabs"), VIEWS.map(tab));
@@ -138,8 +155,11 @@ async function attempt() {
     await app.loadExamples();
     about();
     if (begun) return;
+    const view = await restored();
     begun = true;
-    go(await restored());
+    history.replaceState({ view }, "", location.href);
+    go(view);
+    keep();
   } catch (error) {
     if (!(error instanceof Problem) && error.name !== "Error") console.warn(error);
     if (error instanceof Problem && error.status !== 401) {
@@ -148,21 +168,27 @@ async function attempt() {
   }
 }
 
-/** The state of the link that the page was opened with, or the first example. */
+/** The state of the link that the page was opened with, what this tab showed before a reload, or the example. */
 async function restored() {
+  const first = !sessionStorage.getItem(TAB);
   try {
-    const state = await unpacked(location.hash);
-    if (state) {
-      const view = app.fromState(state);
-      place("speed-unit").value = app.unitName;
-      return view;
-    }
+    const state = (await unpacked(location.hash)) ?? (first ? null : JSON.parse(sessionStorage.getItem(TAB)));
+    if (state) return take(state);
   } catch {
+    sessionStorage.removeItem(TAB);
     place("banner").textContent = "The link was cut or changed on its way: here is an example instead.";
     place("banner").hidden = false;
   }
   app.show(new Design(app.examples.blades[FIRST_BLADE]));
   return "explorer";
+}
+
+/** Take over a state; from then on this tab keeps it, and the address no longer has to. */
+function take(state) {
+  const view = app.fromState(state);
+  place("speed-unit").value = app.unitName;
+  history.replaceState({ view }, "", location.pathname + location.search);
+  return view;
 }
 
 async function about() {
@@ -183,9 +209,10 @@ watchService();
 addEventListener("hashchange", async () => {
   const state = await unpacked(location.hash).catch(() => null);
   if (!state) return;
-  const view = app.fromState(state);
-  place("speed-unit").value = app.unitName;
+  const view = take(state);
   app.changed("designs");
   go(view);
 });
+addEventListener("popstate", ({ state }) => begun && state?.view && go(state.view));
+app.onChange((what) => begun && what !== "theme" && keep());
 begin();

@@ -162,6 +162,7 @@ export class ExplorerView {
       return this.findings.show({ problem: new Error("No node touches the casing: choose one at the tip.") });
     }
     this.#moved = true;
+    this.app.changed("moved");
     this.chosen = null;
     this.findings.show({ boundary: null, lobes: null, unstable: null, damping: null, problem: null });
     return this.answers.ask({ blade: design.blade, contact: design.contact, range: { ...range } });
