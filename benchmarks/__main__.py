@@ -28,6 +28,7 @@ MEASUREMENTS = {
     "extensions": "benchmarks.model_extensions",
     "witness": "benchmarks.time_witness",
     "liner": "benchmarks.time_domain_liner",
+    "page": "benchmarks.page_speed",
 }
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, With
 from sdm_core.assessment.campbell import DEFAULT_ORDERS, HIGHEST_ORDER
 from sdm_core.blade import Blade
 from sdm_core.contact import ContactConfiguration
-from sdm_core.errors import InvalidInput
+from sdm_core.errors import InvalidInput, OutOfSpeedRange
 from sdm_core.validation import KE_LIMIT, SPEED_LIMITS_HZ, number
 from service.rest.question_schemas import BLADE, CONTACT, KE_MAX, POINTS_EXAMPLE
 from service.rest.questions import read_question, settings_of, the_blade, the_contact, the_ke_max
@@ -104,6 +104,15 @@ class CampbellQuestion(RangeQuestion):
     engine_orders: Annotated[tuple[int, ...], PlainValidator(_orders), WithJsonSchema(_ORDERS)] = (
         DEFAULT_ORDERS
     )
+
+    @model_validator(mode="after")
+    def _within_the_modal_data(self) -> Self:
+        for i, speed in enumerate(self.speed_range_hz):
+            try:
+                self.blade.at_speeds(np.array([speed]))
+            except OutOfSpeedRange as error:
+                raise OutOfSpeedRange(f"speed_range_hz[{i}]", error.value, error.remedy) from None
+        return self
 
 
 class LobesQuestion(RangeQuestion):

@@ -89,7 +89,7 @@ class SensitivitiesReply(Reply):
 
 
 class MapReply(Reply):
-    """Verdicts on a grid: rows go with `ke`, columns with `speed_hz`; of the arrays those of `fields`, if given."""
+    """Verdicts on a grid, those asked for by `fields`: rows go with `ke`, columns with `speed_hz`."""
 
     speed_hz: list[float]
     ke: list[float]

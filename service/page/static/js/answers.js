@@ -10,7 +10,7 @@ const LIVE = { speeds: 120, stiffnesses: 120 };
 /** Permanent contact costs milliseconds; with arcs of contact every exact speed costs some 20. */
 const SETTLED = {
   permanent: { speeds: 300, stiffnesses: 150, boundary: [400], lobes: 40 },
-  arcs: { speeds: 120, stiffnesses: 120, boundary: [31, 121], lobes: 6 },
+  arcs: { speeds: 120, stiffnesses: 120, boundary: [21, 121], lobes: 6 },
 };
 /** Without a change for so long, the exact core is asked, ms. */
 const PAUSE = 90;

@@ -17,6 +17,8 @@ export class App extends EventTarget {
   point = null;
   /** Identifier of the screening that is open; null for none. */
   job = null;
+  /** Id of the simulation that is looked at; null for none. */
+  simulation = null;
 
   get unit() {
     return new SpeedUnit(this.unitName, this.active?.firstHz ?? 1);
@@ -88,26 +90,29 @@ export class App extends EventTarget {
       ...design.toState(),
       example: named(design.base) ?? null,
       base: named(design.base) ? null : place(bases, design.base),
+      shaped: place(bases, design.shapedBase),
       profile: place(profiles, design.profile),
     }));
     return {
       version: 1, view: viewName, designs, active: this.designs.indexOf(this.active), bases, profiles,
-      range: this.range, unit: this.unitName, point: this.point, job: this.job,
+      range: this.range, unit: this.unitName, point: this.point, job: this.job, simulation: this.simulation,
     };
   }
 
   /** @returns {string} the view that the state was taken in */
   fromState(state) {
-    this.designs = state.designs.map(({ example, base, profile, ...rest }) =>
-      new Design(example ? this.examples.blades[example] : state.bases[base], {
-        profile: profile === null ? null : state.profiles[profile],
-      }).take(rest),
-    );
+    this.designs = state.designs.map(({ example, base, shaped, profile, ...rest }) => {
+      const loaded = example ? this.examples.blades[example] : state.bases[base];
+      const design = new Design(loaded, { profile: profile === null ? null : state.profiles[profile] });
+      design.shapedBase = shaped === null ? null : state.bases[shaped];
+      return design.take(rest);
+    });
     this.active = this.designs[state.active] ?? this.designs[0];
     Object.assign(this.range, state.range);
     this.unitName = state.unit;
     this.point = state.point;
     this.job = state.job ?? null;
+    this.simulation = state.simulation ?? null;
     return state.view;
   }
 }

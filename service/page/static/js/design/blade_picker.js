@@ -14,7 +14,7 @@ export class BladePicker {
     this.app = app;
     this.onBlade = onBlade;
     this.choice = h("select", { id: "blade-choice", onchange: () => this.#chosen() });
-    this.file = h("input", { type: "file", accept: ".json,application/json", class: "hidden", id: "blade-file", tabIndex: -1, onchange: () => {
+    this.file = h("input", { type: "file", accept: ".json,application/json", hidden: true, id: "blade-file", onchange: () => {
       if (this.file.files[0]) this.read(this.file.files[0]);
       this.file.value = "";
     } });

@@ -204,10 +204,10 @@ export class CompareView {
         cell(unstable === null ? "–" : percent(unstable)),
         cell(damping ? `× ${number(damping.factor, 3)}` : "–"), actions);
     };
-    const headings = ["Smallest Kₑ [N/m]", "Margin over the liner", `Worst speed [${unit.symbol}]`, "Mode", "Chatter [Hz]", "Speeds unstable at the liner’s Kₑ", "Damping needed"];
+    const headings = ["Smallest Kₑ [N/m]", "Margin", `Worst speed [${unit.symbol}]`, "Mode", "Chatter [Hz]", "Unstable speeds", "Damping needed"];
     return [
       h("table", {},
-        h("caption", {}, "Designs, by the exact core ", h("button", { type: "button", class: "small no-print", onclick: () => this.#save() }, "CSV")),
+        h("caption", {}, liner ? `Designs at the liner’s Kₑ of ${stiffness(liner)}, by the exact core ` : "Designs, by the exact core ", h("button", { type: "button", class: "small no-print", onclick: () => this.#save() }, "CSV")),
         h("thead", {}, h("tr", {}, heading("Design", false), headings.map((text) => heading(text)), h("td", { class: "no-print" }))),
         h("tbody", {}, this.app.designs.map(row))),
     ];

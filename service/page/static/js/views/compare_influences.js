@@ -67,7 +67,7 @@ export class Influences {
     const said = gain === null ? "Give the liner’s Kₑ in the explorer." : gain <= 0 ? `It clears ${stiffness(target)} already.` : `To reach ${stiffness(target)} by one parameter alone, as far as the slopes hold; the explorer’s sliders tell what a larger change does.`;
     const change = (needed) => {
       if (needed === null) return "–";
-      if (Math.abs(needed) > 1 || needed < -0.9) return "out of reach alone";
+      if (needed > 9 || needed < -0.9) return "out of reach alone";
       return `${needed > 0 ? "+" : "−"}${percent(Math.abs(needed), 2)}${Math.abs(needed) > LARGEST_CHANGE ? " (beyond the slope)" : ""}`;
     };
     const row = ({ parameter, unit, value, relative, needed }) => h("tr", {},

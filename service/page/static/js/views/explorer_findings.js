@@ -92,7 +92,7 @@ export class Findings {
         : `Map of ${map.speed_hz.length} × ${map.ke.length} points: ${percent(unstableShare(map))} unstable, ${percent(map.exactShare)} of it answered by the exact core${map.model ? `, the rest by model ${map.model}` : ""}.`);
     }
     if (boundary) {
-      const errors = boundary.error_estimate.filter((value) => value !== null);
+      const errors = boundary.error_estimate.filter((value, i) => value !== null && boundary.critical_ke[i] !== null);
       parts.push(`Boundary exact at ${boundary.speed_hz.length} speeds${errors.length ? `, error at most ${number(Math.max(...errors), 2)} of Kₑ` : ""}.`);
     }
     if (busy) parts.push("The exact core is at work…");

@@ -19,15 +19,18 @@ export class PointReading {
     this.clear = clear;
     this.place = h("h3", {}, "Point of the map");
     this.table = h("dl", { class: "reading" });
+    this.hint = h("p", { class: "note" });
     this.actions = h("div", { class: "actions" });
-    this.element = h("section", { class: "point", "aria-label": "Point of the map" }, this.place, this.table, this.actions);
+    this.element = h("section", { class: "point", "aria-label": "Point of the map" }, this.place, this.hint, this.table, this.actions);
     this.exact = settled(REST, (place) => this.#askExact(place));
     this.#hint();
   }
 
   #hint() {
     fill(this.place, "Point of the map");
-    fill(this.table, h("dd", { class: "note" }, "Move over the map for verdict, growth and chatter frequency; click to choose a point."));
+    fill(this.hint, "Move over the map for verdict, growth and chatter frequency; click to choose a point.");
+    this.hint.className = "note";
+    fill(this.table);
     fill(this.actions);
   }
 
@@ -62,7 +65,9 @@ export class PointReading {
     } catch (error) {
       if (error.name === "AbortError" || error instanceof Unreachable) return;
       if (!(error instanceof Problem)) throw error;
-      fill(this.table, h("dd", { class: "problem" }, `${error.field} = ${error.value}: ${error.remedy}`));
+      fill(this.table);
+      fill(this.hint, `${error.field} = ${error.value}: ${error.remedy}`);
+      this.hint.className = "problem";
     }
   }
 
@@ -70,6 +75,7 @@ export class PointReading {
     const { unit, point } = this.app;
     const chosen = point && point.speed_hz === place.speed_hz && point.ke === place.ke;
     fill(this.place, `${unit.write(place.speed_hz)}, Kₑ = ${stiffness(place.ke)}`, chosen ? h("span", { class: "badge" }, "chosen") : null);
+    fill(this.hint);
     const rows = [];
     const row = (name, value) => rows.push(h("dt", {}, name), h("dd", {}, value));
     // Lines stay where they are while the pointer moves: what is not yet known is a dash.
