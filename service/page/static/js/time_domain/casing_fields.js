@@ -1,7 +1,7 @@
 /** How the casing comes near the tip: closing in evenly, or pressed oval. */
 
 import { fresh, h } from "../dom.js";
-import { Field } from "./field.js";
+import { Field } from "../field.js";
 
 const MICRO = 1e6;
 /** Ways that casings go, in metres; what suits which question is said in the hints. */

@@ -3,7 +3,7 @@
 import { fill, h } from "../dom.js";
 import { number } from "../format.js";
 import { CasingFields } from "./casing_fields.js";
-import { Field } from "./field.js";
+import { Field } from "../field.js";
 
 /** Long enough that growth shows from the first touch on; a few seconds' work at most. */
 const RESPONSE_REVOLUTIONS = 150;
