@@ -32,8 +32,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProcess]
 
 def batches(opened, service: ServedProcess, **context):
     """The page with its view of batches."""
-    watched = opened(service, **context)
-    watched.page.get_by_role("link", name="Batches").click()
+    watched = opened(service, "page/#view=batches", **context)
     watched.page.wait_for_selector(".order")
     return watched
 
@@ -98,11 +97,10 @@ def test_a_batch_is_asked_for_watched_and_ranked(opened, service, pictures):
 
 
 def test_maps_come_when_their_rows_are_in_sight_and_open_large(opened, service, first):
-    watched = opened(service)
+    watched = opened(service, "page/#view=batches")
     page, asked = watched.page, []
     page.on("request", lambda r: asked.append(r.url) if "map.png" in r.url else None)
     page.set_viewport_size({"width": 1200, "height": 420})
-    page.get_by_role("link", name="Batches").click()
     page.get_by_role("button", name="the first").click()
     watched.until("[...document.querySelectorAll('.small-map img')].some(i => i.naturalWidth > 100)")
     page.wait_for_timeout(1500)
@@ -226,10 +224,9 @@ def test_a_dropped_file_is_taken_and_can_be_taken_away_again(opened, service):
 
 
 def test_what_is_refused_is_said_at_its_field_and_nothing_typed_is_lost(opened, service):
-    watched = opened(service)
+    watched = opened(service, "page/#view=batches")
     watched.expected.append("422")
     page = watched.page
-    page.get_by_role("link", name="Batches").click()
     screen(page, {"Name": "too stiff a liner", "Kₑ of the liner": "30000"})
     fault = page.locator(".order .problem:visible")
     fault.wait_for()
@@ -262,10 +259,9 @@ def test_a_batch_is_cancelled_and_its_rest_is_run(opened, service, tmp_path):
 
 
 def test_a_batch_is_followed_over_a_restart_of_the_service(opened, service):
-    watched = opened(service)
+    watched = opened(service, "page/#view=batches")
     watched.expected += ["ERR_", "Failed to load resource"]
     page = watched.page
-    page.get_by_role("link", name="Batches").click()
     page.get_by_label("generic-compressor-blade").check()
     screen(page, {"Name": "over a restart"}, points=40)
     page.wait_for_selector(".job-view")
@@ -290,8 +286,7 @@ def test_a_reader_sees_batches_and_is_told_why_none_can_be_started(opened, tmp_p
         for role, key in keys.items():
             page = opened(service, go=False).page
             page.add_init_script(f"sessionStorage.setItem('rubscreen.key', '{key}')")
-            page.goto(service.url)
-            page.get_by_role("link", name="Batches").click()
+            page.goto(f"{service.url}/page/#view=batches")
             page.get_by_text("There are none yet.").wait_for()
             assert page.locator(".order button.primary").is_enabled() == (role is Role.submit)
             why = page.locator(".order .warning:visible").all_inner_texts()

@@ -48,8 +48,7 @@ def service(data) -> Iterator[ServedProcess]:
 
 def models(opened, service: ServedProcess, **context):
     """The page with its view of models."""
-    watched = opened(service, **context)
-    watched.page.get_by_role("link", name="Models").click()
+    watched = opened(service, "page/#view=models", **context)
     watched.page.wait_for_selector(".models-table")
     return watched
 
@@ -114,10 +113,9 @@ def test_audits_are_counted_while_one_looks_and_an_alarm_of_another_model_is_sho
 def test_a_worse_model_is_refused_with_reasons_forced_only_apart_from_that_and_rolled_back(
     opened, service, data, pictures
 ):
-    watched = opened(service)
+    watched = opened(service, "page/#view=models")
     watched.expected.append("409")
     page, worse = watched.page, data[1]
-    page.get_by_role("link", name="Models").click()
     page.get_by_role("button", name=f"Make {worse} the active model").click()
     dialog = page.get_by_role("dialog")
     assert "in place of" in dialog.inner_text() and SHIPPED_ID in dialog.inner_text()
@@ -159,7 +157,6 @@ def test_who_may_not_exchange_models_is_not_offered_it(opened, tmp_path):
         page = opened(service, go=False).page
         page.add_init_script(f"sessionStorage.setItem('rubscreen.key', '{key}')")
         page.goto(service.url)
-        page.get_by_role("link", name="Models").click()
         page.get_by_text("Exchanging the model takes a key of role admin.").wait_for()
         assert page.get_by_role("button", name="Roll back…").count() == 0
     finally:

@@ -64,8 +64,9 @@ const keep = settled(300, () => {
 function makeTabs() {
   const tab = ([id, title]) =>
     h("li", {}, h("a", {
-      href: "#", data: { view: id },
+      href: `#view=${id}`, data: { view: id },
       onclick: (event) => {
+        if (event.ctrlKey || event.metaKey || event.shiftKey) return; // in a tab of its own
         event.preventDefault();
         step(id);
       },
@@ -171,17 +172,24 @@ async function attempt() {
 /** The state of the link that the page was opened with, what this tab showed before a reload, or the example. */
 async function restored() {
   const first = !sessionStorage.getItem(TAB);
+  const { hash } = location;
   try {
-    const state = (await unpacked(location.hash)) ?? (first ? null : JSON.parse(sessionStorage.getItem(TAB)));
-    if (state) return take(state);
+    const state = (await unpacked(hash)) ?? (first ? null : JSON.parse(sessionStorage.getItem(TAB)));
+    if (state) {
+      const view = take(state);
+      return viewOf(hash) ?? view;
+    }
   } catch {
     sessionStorage.removeItem(TAB);
     place("banner").textContent = "The link was cut or changed on its way: here is an example instead.";
     place("banner").hidden = false;
   }
   app.show(new Design(app.examples.blades[FIRST_BLADE]));
-  return "explorer";
+  return viewOf(hash) ?? "explorer";
 }
+
+/** The view that an address names, "#view=compare"; null for none. */
+const viewOf = (hash) => VIEWS.find(([id]) => hash === `#view=${id}`)?.[0] ?? null;
 
 /** Take over a state; from then on this tab keeps it, and the address no longer has to. */
 function take(state) {
@@ -207,6 +215,7 @@ makeTools();
 makeKeyDialog();
 watchService();
 addEventListener("hashchange", async () => {
+  if (viewOf(location.hash)) return go(viewOf(location.hash));
   const state = await unpacked(location.hash).catch(() => null);
   if (!state) return;
   const view = take(state);
