@@ -130,6 +130,28 @@ def test_a_click_chooses_a_point_that_stays_when_the_pointer_leaves(explorer):
     assert figures(explorer.text("section.point h3"))[0] == pytest.approx(241.0 * 60, rel=2e-3)
 
 
+def test_a_chosen_point_is_asked_about_again_when_the_design_changes(explorer):
+    explorer.page.mouse.click(*point_of(explorer, 241.0, 12_000.0))
+    explorer.page.mouse.move(5, 5)
+    explorer.until("document.querySelector('.reading').innerText.includes('✕ unstable')")
+    explorer.slide("damping", 0.8)
+    explorer.until("document.querySelector('.reading').innerText.includes('✓ stable')")
+    explorer.until("document.querySelector('.reading').innerText.includes('exact core')")
+    assert "chosen" in explorer.text("section.point")
+
+
+def test_another_blade_keeps_the_contact(explorer):
+    explorer.page.click("text=Trailing edge (TE)")
+    explorer.page.select_option("#blade-choice", "generic_compressor_blade")
+    explorer.until("document.querySelector('.findings').innerText.includes('generic-compressor-blade · TE')")
+
+
+def test_a_blade_of_one_state_says_what_that_means(explorer):
+    blade = blade_to_dict(ROTOR_37)
+    drop(explorer, "one.json", json.dumps(blade | {"states": blade["states"][1:2]}))
+    explorer.until("document.querySelector('.controls').innerText.includes('One modal state')")
+
+
 def test_a_lobe_of_the_table_stands_out_with_its_orders(explorer):
     explorer.page.click("[aria-label='Lobe 1: show on both charts']")
     explorer.until(

@@ -156,7 +156,7 @@ def test_who_may_not_exchange_models_is_not_offered_it(opened, tmp_path):
     try:
         page = opened(service, go=False).page
         page.add_init_script(f"sessionStorage.setItem('rubscreen.key', '{key}')")
-        page.goto(service.url)
+        page.goto(f"{service.url}/page/#view=models")
         page.get_by_text("Exchanging the model takes a key of role admin.").wait_for()
         assert page.get_by_role("button", name="Roll back…").count() == 0
     finally:

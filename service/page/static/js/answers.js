@@ -114,7 +114,7 @@ export class Answers extends EventTarget {
         await new Promise((drawn) => this.#tell("map", { map, live: true, since, drawn }));
       } catch (error) {
         // Outside its domain the surrogate says so; what follows is exact then.
-        if (error instanceof Problem) this.#tell("outside", error);
+        if (error instanceof Problem) this.#tell(error.status === 422 ? "outside" : "problem", error);
         else if (!(error instanceof Unreachable)) throw error;
       }
     } while (this.#again);

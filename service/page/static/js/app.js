@@ -60,18 +60,50 @@ export class App extends EventTarget {
     this.show(design);
   }
 
-  /** Keep the active design as it is, and go on with a copy of it. */
+  /** The designs without those that are as another is, which a copy is until it is changed. */
+  get distinct() {
+    return [...new Map(this.designs.map((design) => [design.sameness, design]).reverse()).values()].reverse();
+  }
+
+  /** Keep the active design as it is, and go on with a copy of it. @returns {boolean} false where it was kept already */
   keep() {
-    const twin = this.active.copy();
+    const { active } = this;
+    if (this.designs.some((other) => other !== active && other.sameness === active.sameness)) return false;
+    this.#goOnWith(active);
+    this.changed("designs");
+    return true;
+  }
+
+  /** Go on with a copy of a kept design: what is changed of it leaves the kept one as it was. */
+  open(design) {
+    if (design !== this.active) {
+      this.#drop();
+      this.#goOnWith(design);
+      [this.range.low_hz, this.range.high_hz] = design.usualRange();
+      this.point = null;
+    }
+    this.changed("designs");
+  }
+
+  #goOnWith(design) {
+    const twin = design.copy();
     this.designs.push(twin);
     this.active = twin;
-    this.changed("designs");
+  }
+
+  /** The active design, where another is the same. */
+  #drop() {
+    const { active } = this;
+    const twice = this.designs.some((other) => other !== active && other.sameness === active.sameness);
+    if (twice) this.designs = this.designs.filter((kept) => kept !== active);
   }
 
   remove(design) {
     if (this.designs.length < 2) return;
-    this.designs = this.designs.filter((kept) => kept !== design);
-    if (this.active === design) this.show(this.designs[0]);
+    const rest = this.designs.filter((kept) => kept.sameness !== design.sameness);
+    if (!rest.length) return;
+    this.designs = rest;
+    if (!rest.includes(this.active)) this.show(rest[0]);
     else this.changed("designs");
   }
 

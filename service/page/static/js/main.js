@@ -117,8 +117,10 @@ function makeKeyDialog() {
   const dialog = place("key-dialog");
   const open = (why) => {
     place("key-why").textContent = why;
+    // Another request may be refused while somebody types.
+    if (dialog.open) return;
     place("key").value = "";
-    if (!dialog.open) dialog.showModal();
+    dialog.showModal();
   };
   events.addEventListener("locked", ({ detail: problem }) => {
     place("give-key").hidden = false;

@@ -28,7 +28,7 @@ export class BladeChoice {
   }
 
   fillDesigns() {
-    fill(this.designs, this.app.designs.map((design) => tick(nameOf(design), this.ticked.get(design.id) ?? true, (on) => {
+    fill(this.designs, this.app.distinct.map((design) => tick(nameOf(design), this.ticked.get(design.id) ?? true, (on) => {
       this.ticked.set(design.id, on);
       this.told();
     })));
@@ -46,7 +46,7 @@ export class BladeChoice {
   }
 
   get chosenDesigns() {
-    return this.app.designs.filter((design) => this.ticked.get(design.id) ?? true);
+    return this.app.distinct.filter((design) => this.ticked.get(design.id) ?? true);
   }
 
   get chosenExamples() {

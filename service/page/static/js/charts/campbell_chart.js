@@ -46,7 +46,7 @@ export class CampbellChart extends Chart {
     };
     this.note.textContent = lobe
       ? `Lobe ${chosen + 1}: mode ${lobe.mode} chatters at ${number(lobe.tip.chatter_hz)} Hz with ` +
-        `${number(lobe.tip.lobes_per_revolution)} waves a revolution, between engine orders ${near.join(" and ")}.`
+        `${number(lobe.tip.lobes_per_revolution)} wear lobes round the casing, between engine orders ${near.join(" and ")}.`
       : "Dots are where the lobes chatter; ○ are where engine orders meet a mode. Choose a lobe in the table to see its mode and orders.";
     const range_ = `${number(column(0)[0])} to ${number(column(0).at(-1))} Hz`;
     return this.draw(traces, layout, `${modes} modes, the first from ${range_}; engine orders 1 to ${Math.max(...orders)}.`, {

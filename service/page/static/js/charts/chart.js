@@ -18,6 +18,8 @@ export class Chart {
    */
   constructor({ title, name, height = 440 }) {
     this.name = name;
+    /** Of what design, in words: in the title of pictures and the names of files. */
+    this.about = "";
     this.title = title;
     this.height = height;
     this.plot = h("div", { class: "plot", role: "img", "aria-label": `${title}. Nothing drawn yet.` });
@@ -110,23 +112,29 @@ export class Chart {
     this.plot.setAttribute("aria-label", `${this.title}. ${message || "Nothing drawn."}`);
   }
 
+  /** Name of a file, without its ending: letters, digits and what every file system takes. */
+  #file() {
+    const words = [this.name, this.about].join(" ").replaceAll("×", "x").replaceAll("%", "percent");
+    return words.normalize("NFKD").replace(/[^A-Za-z0-9.+_-]+/g, "_").replace(/^_+|_+$/g, "").slice(0, 120);
+  }
+
   async save(format) {
     if (!this.last) return;
     const { clientWidth: width, clientHeight: height } = this.plot;
-    const text = { ...this.layout(this.last.layout), title: { text: escaped(this.title), x: 0.02, font: { size: 15 } } };
+    const text = { ...this.layout(this.last.layout), title: { text: escaped([this.title, this.about].filter(Boolean).join(": ")), x: 0.02, font: { size: 14 } } };
     text.margin = { ...text.margin, t: 44 };
     const url = await Plotly.toImage(
       { data: this.plot.data, layout: { ...this.plot.layout, ...text, xaxis: this.plot.layout.xaxis, yaxis: this.plot.layout.yaxis } },
       { format, width, height: height + 32, scale: format === "png" ? 2 : 1 },
     );
-    download(url, `${this.name}.${format}`);
+    download(url, `${this.#file()}.${format}`);
     say(`${this.title} saved as ${format.toUpperCase()}`);
   }
 
   saveCsv() {
     const table = typeof this.csv === "function" ? this.csv() : this.csv;
     if (!table) return;
-    saveTable(table, `${this.name}.csv`);
+    saveTable(table, `${this.#file()}.csv`);
     say(`Figures of ${this.title} saved as CSV`);
   }
 }

@@ -9,6 +9,8 @@ import { Crosshair } from "./crosshair.js";
 const [SURROGATE_TOP, EXACT_STABLE, EXACT_UNSTABLE] = [0.6, 0.8, 1.0];
 /** Odds of ten to this power are shown as sure. */
 const SURE = 4;
+/** Plotly.js takes two clicks within so long as one double click, ms. */
+const DOUBLE_CLICK = 300;
 
 export class MapChart extends Chart {
   /**
@@ -32,6 +34,7 @@ export class MapChart extends Chart {
     this.plot.addEventListener("keydown", (event) => this.#key(event));
     this.plot.addEventListener("blur", () => this.#emit("cursor", null));
     this.note.before(mapKey());
+    this.note.textContent = "Drag over a part to enlarge it; double-click to see all again.";
     this.cursor = null;
     this.parts = {};
   }
@@ -80,6 +83,7 @@ export class MapChart extends Chart {
 
   #table() {
     const { map } = this.parts;
+    if (!map) return null;
     const rows = [];
     map.ke.forEach((ke, i) => map.speed_hz.forEach((speed, j) => {
       const at = i * map.speed_hz.length + j;
@@ -106,7 +110,15 @@ export class MapChart extends Chart {
   #released(event) {
     if (!this.pressed || Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) > 4) return;
     const found = this.cross.at(event);
-    if (found) this.#emit("choose", { speed_hz: this.parts.unit.toHz(found.x), ke: Math.max(found.y, 0) });
+    const second = this.choosing;
+    clearTimeout(this.choosing);
+    this.choosing = null;
+    // Two clicks in a row leave the enlargement, and choose nothing.
+    if (!found || second) return;
+    this.choosing = setTimeout(() => {
+      this.choosing = null;
+      this.#emit("choose", { speed_hz: this.parts.unit.toHz(found.x), ke: Math.max(found.y, 0) });
+    }, DOUBLE_CLICK);
   }
 
   #key(event) {

@@ -19,15 +19,18 @@ export class BladePicker {
       this.file.value = "";
     } });
     this.said = h("div", { role: "alert" });
+    this.remark = h("div", {});
     this.element = h("div", {},
       h("div", { class: "row" }, h("label", { for: "blade-choice" }, "Blade"), this.choice,
         h("button", { type: "button", onclick: () => this.file.click() }, "Open a file…"), this.file),
       h("p", { class: "hint" }, "Or drop a blade file (rubscreen/blade/1) or a profile (rubscreen/profile/1) on this page."),
-      this.said);
+      this.said, this.remark);
     this.#takeDrops();
   }
 
   show(design) {
+    fill(this.remark, design.base.states.length > 1 ? null : h("p", { class: "warning" },
+      "One modal state: frequencies and mode shapes are taken as constant over speed. A rotating blade stiffens, so give states at two or more speeds for a verdict to rely on."));
     const { blades, profiles } = this.app.examples;
     const option = (value, text, selected) => h("option", { value, selected }, text);
     const example = Object.keys(blades).find((name) => blades[name] === design.base);
@@ -97,7 +100,7 @@ export class BladePicker {
 
   #refuse(error, source) {
     const text = error instanceof Problem
-      ? [h("strong", {}, `${source}: ${error.title}.`), ` ${error.field} = ${error.value}: ${error.remedy}`]
+      ? [h("strong", {}, `${source}: ${error.title}.`), ` ${error.field} = ${error.value}: ${error.remedy}.`]
       : [h("strong", {}, "This file cannot be used. "), error.message];
     fill(this.said, h("p", { class: "problem" }, text, " What was shown before stays."));
   }

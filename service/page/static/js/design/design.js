@@ -110,6 +110,11 @@ export class Design {
     return parts.join(", ");
   }
 
+  /** Equal for designs that are the same in every figure. */
+  get sameness() {
+    return JSON.stringify([this.blade, this.contact]);
+  }
+
   /** What tables and keys call it. */
   get title() {
     return [this.label, this.contactName, this.changeName].filter(Boolean).join(" · ");
@@ -129,6 +134,15 @@ export class Design {
   coveredRange() {
     const states = this.base.states.map((state) => state.speed_hz);
     return states.length > 1 ? [Math.min(...states), Math.max(...states)] : [0, Infinity];
+  }
+
+  /** Take over where another design touches, as far as this blade has nodes of those names. */
+  touchAs(other) {
+    const touching = Object.entries(other.weights).filter(([, weight]) => weight > 0);
+    if (touching.length && touching.every(([node]) => this.nodes.includes(node))) {
+      this.weights = Object.fromEntries(this.nodes.map((node) => [node, other.weights[node] ?? 0]));
+    }
+    this.arcs = structuredClone(other.arcs);
   }
 
   copy() {

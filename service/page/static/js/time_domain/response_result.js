@@ -62,6 +62,7 @@ export class ResponseResult {
         ))),
       ),
       h("p", { class: "note" }, account(figures.energy)),
+      figures.critical_ke_factor > 1 ? h("p", { class: "note" }, `The liner gives elastically before it is cut, so that with this liner Kₑ = ${number(figures.ke)} N/m acts as ${number(figures.ke / figures.critical_ke_factor)} N/m in the delay equation: that is what the exact core is asked here, while the explorer's map is of Kₑ itself.`) : null,
       h("p", { class: "note" }, "Contact is one-sided and the liner wears, so the delay equation behind the exact core speaks of the onset only: how far vibration then goes, and whether it ends, the simulation says."),
     );
   }

@@ -103,7 +103,7 @@ export class CompareView {
   }
 
   async #ask() {
-    const { designs, examples } = this.app;
+    const { distinct: designs, examples } = this.app;
     this.asking?.abort();
     this.asking = new AbortController();
     const { signal } = this.asking;
@@ -155,7 +155,7 @@ export class CompareView {
   #draw() {
     const { range, unit } = this.app;
     const whole = this.found.filter(({ boundary }) => boundary);
-    const waiting = this.app.designs.length - this.found.length;
+    const waiting = this.app.distinct.length - this.found.length;
     fill(this.verdict, this.#verdict(whole, waiting));
     fill(this.table, this.#rows());
     if (whole.length) {
@@ -163,7 +163,7 @@ export class CompareView {
       this.boundaries.show(whole, span, unit);
     }
     this.#drawDifference(whole);
-    this.influences.show(whole);
+    this.influences.show(whole, waiting > 0);
   }
 
   #verdict(whole, waiting) {
@@ -186,12 +186,12 @@ export class CompareView {
     const row = (design, i) => {
       const one = this.found.find((found) => found.design === design);
       const { worst, damping, why, unstable } = one ?? {};
-      const active = design === this.app.active;
+      const active = design.sameness === this.app.active.sameness;
       const edit = h("button", { type: "button", class: "small", "aria-label": `Open ${design.title} in the explorer`, onclick: () => {
-        this.app.show(design);
+        this.app.open(design);
         this.app.go("explorer");
       } }, active ? "In the explorer" : "Explore");
-      const remove = h("button", { type: "button", class: "small", "aria-label": `Remove ${design.title}`, disabled: this.app.designs.length < 2, onclick: () => this.app.remove(design) }, "Remove");
+      const remove = h("button", { type: "button", class: "small", "aria-label": `Remove ${design.title}`, disabled: this.app.distinct.length < 2, onclick: () => this.app.remove(design) }, "Remove");
       const name = h("th", { scope: "row" }, `${i + 1}  ${design.title}`);
       const actions = h("td", { class: "no-print" }, edit, " ", remove);
       if (why) return h("tr", {}, name, h("td", { colspan: 7 }, why), actions);
@@ -209,7 +209,7 @@ export class CompareView {
       h("table", {},
         h("caption", {}, liner ? `Designs at the liner’s Kₑ of ${stiffness(liner)}, by the exact core ` : "Designs, by the exact core ", h("button", { type: "button", class: "small no-print", onclick: () => this.#save() }, "CSV")),
         h("thead", {}, h("tr", {}, heading("Design", false), headings.map((text) => heading(text)), h("td", { class: "no-print" }))),
-        h("tbody", {}, this.app.designs.map(row))),
+        h("tbody", {}, this.app.distinct.map(row))),
     ];
   }
 
@@ -227,7 +227,7 @@ export class CompareView {
     if (whole.length < 2) {
       fill(this.pair);
       fill(this.shares);
-      this.difference.clear("Two designs are needed.");
+      this.difference.clear(this.found.length < this.app.distinct.length ? "Asking the exact core…" : "Two designs are needed.");
       return;
     }
     const [a, b] = [this.first ?? 0, this.second ?? 1].map((i, place) => whole[i] ?? whole[place]);
@@ -236,7 +236,7 @@ export class CompareView {
       return [h("label", { for: id, class: "hidden" }, "Design of the difference map"), h("select", { id, onchange: (event) => {
         set(event.target.selectedIndex);
         this.#drawDifference(whole);
-      } }, whole.map(({ design }) => h("option", { selected: design === chosen.design }, `${this.app.designs.indexOf(design) + 1}  ${design.title}`)))];
+      } }, whole.map(({ design }) => h("option", { selected: design === chosen.design }, `${this.app.distinct.indexOf(design) + 1}  ${design.title}`)))];
     };
     fill(this.pair, whole.length > 2 ? [choice(a, (i) => { this.first = i; }), "against", choice(b, (i) => { this.second = i; })] : null);
     this.#difference(a, b);
@@ -245,7 +245,7 @@ export class CompareView {
   async #difference(a, b) {
     const [low, high] = [Math.max(a.range[0], b.range[0]), Math.min(a.range[1], b.range[1])];
     const { range, unit } = this.app;
-    const names = [a, b].map(({ design }) => `design ${this.app.designs.indexOf(design) + 1}`);
+    const names = [a, b].map(({ design }) => `design ${this.app.distinct.indexOf(design) + 1}`);
     if (low >= high) {
       fill(this.shares);
       return this.difference.clear("The two have no rotor speed in common.");

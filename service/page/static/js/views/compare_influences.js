@@ -23,7 +23,8 @@ export class Influences {
   }
 
   /** @param {{design, worst}[]} found designs with their deepest lobe */
-  show(found) {
+  show(found, waiting) {
+    this.waiting = waiting;
     const chosen = this.found?.[this.which.selectedIndex]?.design ?? this.app.active;
     this.found = found.filter(({ worst }) => worst);
     fill(this.which, this.found.map(({ design }) => h("option", { selected: design === chosen }, design.title)));
@@ -34,7 +35,8 @@ export class Influences {
     const one = this.found[this.which.selectedIndex];
     if (!one) {
       this.slopes = null;
-      return this.chart.clear("No lobe below the largest Kₑ: nothing has to change.");
+      fill(this.table);
+      return this.chart.clear(this.waiting ? "Asking the exact core…" : "No lobe below the largest Kₑ: nothing has to change.");
     }
     if (one.slopes) {
       this.slopes = one;

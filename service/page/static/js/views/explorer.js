@@ -9,7 +9,7 @@ import { RangeFields } from "../design/range_fields.js";
 import { ShapeChanges } from "../design/shape_changes.js";
 import { Sliders } from "../design/sliders.js";
 import { TipPicture } from "../design/tip_picture.js";
-import { fill, h, say } from "../dom.js";
+import { fill, h, say, settled } from "../dom.js";
 import { events } from "../service.js";
 import { Findings } from "./explorer_findings.js";
 import { LobeTable } from "./explorer_lobes.js";
@@ -25,7 +25,11 @@ export class ExplorerView {
     this.findings = new Findings(app, { onDamping: (factor) => this.#damp(factor), onSearch: () => this.answers.searchDamping() });
     this.point = new PointReading(app, { clear: () => this.#choose(null) });
     this.lobes = new LobeTable((index) => this.#chooseLobe(index));
-    this.picker = new BladePicker(app, (design) => (design === app.active ? app.changed("design") : app.replace(design)));
+    this.picker = new BladePicker(app, (design) => {
+      if (design === app.active) return app.changed("design");
+      design.touchAs(app.active);
+      return app.replace(design);
+    });
     this.tip = new TipPicture(() => this.#changed());
     this.ring = new CasingRing(() => this.#changed());
     this.sliders = new Sliders((event) => this.#slid(event));
@@ -34,6 +38,7 @@ export class ExplorerView {
     this.kept = h("p", { class: "note" });
     this.element = this.#lay();
     this.chosen = null;
+    this.pointAgain = settled(120, () => this.shown && this.point.show(app.point));
     this.#connect();
     app.onChange((what) => this.#appChanged(what));
     events.addEventListener("back", () => this.shown && this.#ask());
@@ -51,8 +56,7 @@ export class ExplorerView {
         part("What if", this.sliders.element, this.shapes.element),
         h("div", { class: "actions" },
           h("button", { type: "button", onclick: () => {
-            this.app.keep();
-            say("Kept for comparison");
+            say(this.app.keep() ? "Kept for comparison" : "Kept already");
           } }, "Keep for comparison"),
           h("button", { type: "button", onclick: () => this.app.go("compare") }, "Compare")),
         this.kept),
@@ -69,6 +73,7 @@ export class ExplorerView {
       const stale = live && this.#moved ? { boundary: null, lobes: null } : {};
       const reframed = this.#framed !== (this.#framed = this.#frameName());
       if (reframed || !live || !(await map.showLive(found))) await map.show({ map: found, ...this.#frame(), ...stale });
+      map.element.classList.remove("stale");
       if (live) this.#moved = false;
       drawn();
       measured(live ? "map on screen" : "verified map on screen", since);
@@ -80,7 +85,10 @@ export class ExplorerView {
       measured(fine ? "finer boundary on screen" : "exact boundary on screen", since);
       this.findings.show({ boundary: this.boundary });
     });
-    answers.on("campbell", (found) => campbell.show({ campbell: found, ...this.#frame() }));
+    answers.on("campbell", (found) => {
+      campbell.element.classList.remove("stale");
+      campbell.show({ campbell: found, ...this.#frame() });
+    });
     answers.on("lobes", (found) => this.#showLobes(found));
     answers.on("unstable", (unstable) => this.findings.show({ unstable }));
     answers.on("damping", (damping) => this.findings.show({ damping }));
@@ -93,7 +101,8 @@ export class ExplorerView {
   }
 
   #frame() {
-    const { range, unit, point } = this.app;
+    const { range, unit, point, active } = this.app;
+    this.map.about = this.campbell.about = active.title;
     return { range, unit, point, chosen: this.chosen };
   }
 
@@ -108,6 +117,7 @@ export class ExplorerView {
     this.shown = true;
     this.#fill();
     this.#ask();
+    this.point.show(this.app.point);
   }
 
   hide() {
@@ -127,8 +137,8 @@ export class ExplorerView {
   }
 
   #kept() {
-    const { designs, active } = this.app;
-    const others = designs.filter((design) => design !== active);
+    const { designs, distinct, active } = this.app;
+    const others = distinct.filter((design) => design !== active && (design.sameness !== active.sameness || designs.length > distinct.length));
     this.kept.textContent = others.length ? `Kept: ${others.map((design) => design.title).join("; ")}.` : "";
   }
 
@@ -136,6 +146,7 @@ export class ExplorerView {
     if (!this.shown) return;
     if (what === "designs" || what === "design") {
       this.#fill();
+      this.map.parts.range && this.map.show(this.#frame());
       this.#ask();
     } else if (what === "unit" || what === "theme") {
       this.range.show();
@@ -157,9 +168,14 @@ export class ExplorerView {
   #ask() {
     const { active: design, range } = this.app;
     this.#kept();
+    // What is on screen is of the design before, until answers for this one come.
+    for (const element of [this.map.element, this.campbell.element]) element.classList.add("stale");
+    this.lobes.show(null);
+    this.pointAgain();
     if (!design.touches) {
       this.answers.stop();
-      return this.findings.show({ problem: new Error("No node touches the casing: choose one at the tip.") });
+      this.map.show({ map: null, boundary: null, lobes: null, ...this.#frame() });
+      return this.findings.show({ map: null, boundary: null, lobes: null, unstable: null, damping: null, busy: false, problem: new Error("No node touches the casing: choose one at the tip.") });
     }
     this.#moved = true;
     this.app.changed("moved");

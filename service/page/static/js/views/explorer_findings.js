@@ -6,6 +6,8 @@ import { number, percent, stiffness } from "../format.js";
 
 /** A factor on damping this near to 1 is none. */
 const ENOUGH = 5e-3;
+/** Share of the range of speeds. */
+const NEAR_THE_END = 0.01;
 
 export class Findings {
   /** @param {import("../app.js").App} app  @param {{onDamping: (factor: number) => void, onSearch: () => void}} does */
@@ -45,6 +47,9 @@ export class Findings {
     if (least <= ke) {
       return [title, h("span", { class: "badge bad" }, "✕ chatters"), ` at the liner’s Kₑ of ${stiffness(ke)}: ${share} of the speed range is unstable.`];
     }
+    if (!lobes) {
+      return [title, h("span", { class: "badge" }, "so far stable"), ` at the liner’s Kₑ of ${stiffness(ke)}: nothing comes below it at the ${boundary.speed_hz.length} speeds asked so far; lobes between them are being searched for…`];
+    }
     const margin = Number.isFinite(least) ? `the smallest destabilising Kₑ is ${percent(least / ke - 1)} above it` : `nothing below ${stiffness(this.app.range.ke_max)} destabilises it`;
     return [title, h("span", { class: "badge fine" }, "✓ stable"), ` at the liner’s Kₑ of ${stiffness(ke)} over the whole speed range: ${margin}.`];
   }
@@ -56,7 +61,13 @@ export class Findings {
     if (!lobes.length) return h("li", {}, `No lobe comes below ${stiffness(range.ke_max)} in this range.`);
     const { tip, mode } = lobes[0];
     return h("li", {}, "Worst speed: ", h("strong", {}, unit.write(tip.speed_hz)), ", where ", h("strong", {}, stiffness(tip.ke)),
-      " is enough; ", h("strong", {}, `mode ${mode}`), ` chatters at ${number(tip.chatter_hz)} Hz with ${number(tip.lobes_per_revolution)} waves a revolution.`);
+      " is enough; ", h("strong", {}, `mode ${mode}`), ` chatters at ${number(tip.chatter_hz)} Hz with ${number(tip.lobes_per_revolution)} wear lobes round the casing${this.#atAnEnd(tip.speed_hz)}.`);
+  }
+
+  /** Lobes grow deeper towards low speed: a worst speed at the end of the range says that beyond it is worse. */
+  #atAnEnd(speed_hz) {
+    const { low_hz, high_hz } = this.app.range;
+    return (speed_hz - low_hz) / (high_hz - low_hz) < NEAR_THE_END ? ". It is at the low end of the range: below it there may be worse" : "";
   }
 
   #mend() {
@@ -88,8 +99,8 @@ export class Findings {
     if (outside) parts.push(`Outside what the surrogate was trained for (${outside.field} = ${outside.value}): the exact core answers, which takes longer.`);
     if (map) {
       parts.push(live
-        ? `Map by the surrogate, model ${map.model}: ${percent(unstableShare(map))} unstable; being verified by the exact core…`
-        : `Map of ${map.speed_hz.length} × ${map.ke.length} points: ${percent(unstableShare(map))} unstable, ${percent(map.exactShare)} of it answered by the exact core${map.model ? `, the rest by model ${map.model}` : ""}.`);
+        ? `Map by the surrogate, model ${map.model}: ${percent(unstableShare(map))} of its area unstable; being verified by the exact core…`
+        : `Map of ${map.speed_hz.length} × ${map.ke.length} points: ${percent(unstableShare(map))} of its area unstable, ${percent(map.exactShare)} of it answered by the exact core${map.model ? `, the rest by model ${map.model}` : ""}.`);
     }
     if (boundary) {
       const errors = boundary.error_estimate.filter((value, i) => value !== null && boundary.critical_ke[i] !== null);

@@ -30,7 +30,7 @@ export class LobeTable {
         h("td", { class: "n" }, mode),
         h("td", { class: "n" }, number(tip.chatter_hz)), h("td", { class: "n" }, number(tip.lobes_per_revolution)));
     return fill(this.table, h("table", {},
-      h("thead", {}, h("tr", {}, heading("", false), heading("Kₑ [N/m]"), heading(`Speed [${unit.symbol}]`), heading("Mode"), heading("Chatter [Hz]"), heading("Waves/rev"))),
+      h("thead", {}, h("tr", {}, heading("", false), heading("Kₑ [N/m]"), heading(`Speed [${unit.symbol}]`), heading("Mode"), heading("Chatter [Hz]"), heading("Wear lobes"))),
       h("tbody", {}, lobes.slice(0, SHOWN).map(row))),
     lobes.length > SHOWN ? h("p", { class: "note" }, `${lobes.length - SHOWN} more are on the charts and in the CSV.`) : null);
   }
