@@ -95,9 +95,13 @@ class WatchedPage:
         """What stands in the first element that fits."""
         return self.page.locator(selector).first.inner_text()
 
+    def drawn(self) -> None:
+        """Until map and exact boundary are there."""
+        self.until("document.querySelector('.findings')?.innerText.includes('Boundary exact')")
+
     def settled(self) -> None:
         """Until surrogate and exact core have answered all that the explorer asks."""
-        self.until("document.querySelector('.findings')?.innerText.includes('Boundary exact')")
+        self.drawn()
         self.until("!document.querySelector('.findings').innerText.includes('at work')", 60.0)
 
     def slide(self, name: str, value: float, *, release: bool = True) -> None:

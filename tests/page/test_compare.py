@@ -15,7 +15,7 @@ LE = ContactConfiguration.at("LE")
 def compared(service, opened):
     """Rotor 37 and the generic blade, each with its leading edge in contact."""
     page = opened(service)
-    page.settled()
+    page.drawn()
     page.page.click("text=Leading edge (LE)")
     page.page.click("nav >> text=Compare")
     page.page.select_option(".compare select >> nth=0", label="generic-compressor-blade")
@@ -56,10 +56,10 @@ def test_what_to_change_names_amplitude_frequency_and_damping(compared):
 
 def test_a_design_kept_in_the_explorer_is_compared_with_what_became_of_it(service, opened):
     page = opened(service)
-    page.settled()
+    page.drawn()
     page.page.click("text=Keep for comparison")
     page.slide("damping", 0.5)
-    page.settled()
+    page.drawn()
     page.page.click("nav >> text=Compare")
     page.until("document.querySelector('.compare .verdict').innerText.includes('Safest')", 60.0)
     assert "Safest: nasa-rotor-37 · LE + TE · damping × 3.162" in page.text(".compare .verdict")

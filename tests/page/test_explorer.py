@@ -29,7 +29,7 @@ def figures(text: str) -> list[float]:
 @pytest.fixture
 def explorer(service, opened):
     page = opened(service)
-    page.settled()
+    page.drawn()
     return page
 
 
@@ -48,6 +48,7 @@ def point_of(page, speed_hz: float, ke: float) -> tuple[float, float]:
 
 
 def test_the_first_blade_is_answered_as_the_exact_core_answers_it(explorer, pictures):
+    explorer.settled()
     explorer.page.screenshot(path=pictures / "explorer.png", full_page=True)
     told = explorer.text(".findings")
     (worst,) = least_critical_ke(ROTOR_37, BOTH, *USUAL, 2.5e4, count=1)
@@ -60,6 +61,7 @@ def test_the_first_blade_is_answered_as_the_exact_core_answers_it(explorer, pict
 
 def test_what_the_map_shows_is_what_the_exact_core_says(explorer):
     """Verdicts of the drawn map against the exact boundary drawn on it, away from the boundary."""
+    explorer.settled()
     drawn = explorer.page.evaluate(
         """() => {
           const {data} = document.querySelector(".plot.map");
@@ -78,6 +80,7 @@ def test_what_the_map_shows_is_what_the_exact_core_says(explorer):
 
 
 def test_a_slider_brings_another_map_and_another_boundary(explorer):
+    explorer.settled()
     before = explorer.text(".findings")
     explorer.slide("damping", 0.5)
     explorer.until(f"!document.querySelector('.findings').innerText.includes({before.splitlines()[-1]!r})")
@@ -257,6 +260,7 @@ def test_a_profile_is_built_and_its_thickness_moves_the_map(explorer):
 
 @pytest.mark.parametrize("form", ["PNG", "SVG", "CSV"])
 def test_every_chart_is_saved_as_picture_and_as_figures(explorer, form):
+    explorer.settled()
     for title in ("Stability map", "Campbell diagram"):
         with explorer.page.expect_download() as begun:
             explorer.page.click(f"[aria-label^='{title}: save'] >> text={form}")

@@ -74,7 +74,7 @@ def test_axe_finds_nothing_serious(service, opened, pictures, view, theme):
 
 def test_every_view_is_reached_and_used_by_keyboard_alone(service, opened):
     page = opened(service)
-    page.settled()
+    page.drawn()
     page.page.keyboard.press("Tab")
     assert page.page.evaluate("document.activeElement.textContent") == "Skip to the charts"
     for _ in range(2):
@@ -86,19 +86,19 @@ def test_every_view_is_reached_and_used_by_keyboard_alone(service, opened):
 
 def test_a_link_holds_the_state(service, opened):
     page = opened(service)
-    page.settled()
+    page.drawn()
     page.page.click("text=Trailing edge (TE)")
     page.page.click("text=One quarter")
     page.slide("damping", 0.3)
     page.page.select_option("#speed-unit", "ratio")
     page.page.fill("label:has-text('Liner') + input", "12345")
     page.page.keyboard.press("Enter")
-    page.settled()
+    page.drawn()
     title = page.text(".findings .design-title")
     page.page.click("text=Copy link")
     page.until("location.hash.startsWith('#s=')")
     again = opened(service, page.page.evaluate("location.hash").replace("#", "page/#", 1))
-    again.settled()
+    again.drawn()
     assert (
         again.text(".findings .design-title") == title == "nasa-rotor-37 · TE, 1 arc (25 %) · damping × 1.995"
     )
@@ -108,17 +108,17 @@ def test_a_link_holds_the_state(service, opened):
 
 def test_a_reload_and_the_back_button_lose_nothing(service, opened):
     page = opened(service)
-    page.settled()
+    page.drawn()
     page.page.click("text=Trailing edge (TE)")
     page.slide("damping", 0.5)
-    page.settled()
+    page.drawn()
     page.page.click("nav >> text=Compare")
     page.until("document.querySelector('#view section.compare') !== null")
     page.page.wait_for_timeout(500)
     page.page.reload()
     page.until("document.querySelector('#view section.compare') !== null")
     page.page.go_back()
-    page.settled()
+    page.drawn()
     assert page.text(".findings .design-title") == "nasa-rotor-37 · TE · damping × 3.162"
     page.page.go_forward()
     page.until("document.querySelector('#view section.compare') !== null")
@@ -126,7 +126,7 @@ def test_a_reload_and_the_back_button_lose_nothing(service, opened):
 
 def test_a_link_that_was_cut_says_so_and_shows_an_example(service, opened):
     page = opened(service, "page/#s=q1bKUrIyNDI2")
-    page.settled()
+    page.drawn()
     assert "cut or changed" in page.text("#banner")
 
 
@@ -135,9 +135,9 @@ def test_a_service_that_is_restarted_underneath_loses_nothing(tmp_path, opened, 
     try:
         page = opened(served)
         page.expected = ["ERR_CONNECTION_REFUSED", "Failed to load resource", "ERR_"]
-        page.settled()
+        page.drawn()
         page.page.click("text=Trailing edge (TE)")
-        page.settled()
+        page.drawn()
         served.kill()
         page.slide("damping", 0.5)
         page.until("!document.querySelector('#banner').hidden")
@@ -146,7 +146,7 @@ def test_a_service_that_is_restarted_underneath_loses_nothing(tmp_path, opened, 
         assert "nasa-rotor-37 · TE" in page.text(".findings .design-title")
         served.start()
         page.until("document.querySelector('#banner').hidden", 60.0)
-        page.settled()
+        page.drawn()
         assert page.text(".findings .design-title") == "nasa-rotor-37 · TE · damping × 3.162"
         assert "✕ chatters" in page.text(".findings") or "✓ stable" in page.text(".findings")
     finally:
@@ -169,7 +169,7 @@ def test_a_key_is_asked_for_and_one_that_expires_is_asked_for_again(tmp_path, op
         assert page.violations() == []
         page.page.fill("#key", short)
         page.page.keyboard.press("Enter")
-        page.settled()
+        page.drawn()
         assert "key “short”, role submit" in page.text("#about")
         time.sleep(max(0.0, expires + 0.5 - time.time()))
         page.slide("damping", 0.5)
@@ -178,7 +178,7 @@ def test_a_key_is_asked_for_and_one_that_expires_is_asked_for_again(tmp_path, op
         page.page.fill("#key", long)
         page.page.keyboard.press("Enter")
         page.until("document.querySelector('.findings')?.innerText.includes('damping × 3.162')")
-        page.settled()
+        page.drawn()
         # Keys go with requests alone: neither the address nor what outlives the tab has them.
         assert "rub_" not in page.page.url and page.page.evaluate("Object.keys(localStorage).length") <= 1
     finally:
@@ -187,7 +187,7 @@ def test_a_key_is_asked_for_and_one_that_expires_is_asked_for_again(tmp_path, op
 
 def test_on_paper_the_page_is_light_and_without_its_tools(service, opened, pictures, tmp_path):
     page = opened(service, color_scheme="dark")
-    page.settled()
+    page.drawn()
     paper = Path(pictures) / "explorer.pdf"
     page.page.pdf(path=paper, format="A4", landscape=True, print_background=True)
     assert paper.stat().st_size > 20_000
