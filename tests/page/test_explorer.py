@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import re
 from pathlib import Path
@@ -219,26 +220,26 @@ def test_a_blade_dropped_on_the_page_is_shown(explorer):
     assert f"where {least.ke:,.0f} N/m" in explorer.text(".findings")
 
 
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
-        ("hello", "is not JSON"),
-        ('{"schema": "rubscreen/blade/1", "name": "x"}', "blade.tip_nodes = missing"),
-        ('{"schema": "rubscreen/profile/1", "name": "x"}', "the profile needs it"),
-        ("[1, 2]", "give an object"),
-    ],
-)
-def test_a_file_that_is_no_blade_is_refused_and_nothing_is_lost(explorer, pictures, content, told):
+NO_BLADES = {
+    "hello": "is not JSON",
+    '{"schema": "rubscreen/blade/1", "name": "x"}': "blade.tip_nodes = missing",
+    '{"schema": "rubscreen/profile/1", "name": "x"}': "the profile needs it",
+    "[1, 2]": "give an object",
+}
+
+
+def test_a_file_that_is_no_blade_is_refused_and_nothing_is_lost(explorer, pictures):
     explorer.expected = ["status of 422"]
     before = explorer.text(".findings .design-title")
-    drop(explorer, "odd.json", content)
-    explorer.until(
-        "document.querySelector('.controls [role=alert]').innerText.includes('cannot be used')", 10.0
-    )
-    said = explorer.text(".controls [role=alert]")
-    assert told in said and "What was shown before stays." in said
+    for content, told in NO_BLADES.items():
+        drop(explorer, "odd.json", content)
+        explorer.until(
+            f"document.querySelector('.controls [role=alert]').innerText.includes({told!r})", within_s=10.0
+        )
+        said = explorer.text(".controls [role=alert]")
+        assert "cannot be used" in said and "What was shown before stays." in said
+        assert explorer.text(".findings .design-title") == before
     explorer.page.screenshot(path=pictures / "bad_file.png")
-    assert explorer.text(".findings .design-title") == before
 
 
 def test_a_profile_is_built_and_its_thickness_moves_the_map(explorer):
@@ -258,17 +259,17 @@ def test_a_profile_is_built_and_its_thickness_moves_the_map(explorer):
     assert estimated == pytest.approx(built, rel=0.01)
 
 
-@pytest.mark.parametrize("form", ["PNG", "SVG", "CSV"])
-def test_every_chart_is_saved_as_picture_and_as_figures(explorer, form):
+def test_every_chart_is_saved_as_picture_and_as_figures(explorer):
     explorer.settled()
-    for title in ("Stability map", "Campbell diagram"):
+    for title, form in itertools.product(("Stability map", "Campbell diagram"), ("PNG", "SVG", "CSV")):
         with explorer.page.expect_download() as begun:
             explorer.page.click(f"[aria-label^='{title}: save'] >> text={form}")
         content = Path(begun.value.path()).read_bytes()
+        assert "nasa-rotor-37_LE_+_TE" in begun.value.suggested_filename
         if form == "PNG":
             assert content.startswith(b"\x89PNG") and len(content) > 10_000
         elif form == "SVG":
-            assert b"<svg" in content and b"Rotor speed [rpm]" in content
+            assert b"<svg" in content and b"Rotor speed [rpm]" in content and b"nasa-rotor-37" in content
         else:
             rows = list(csv.DictReader(io.StringIO(content.decode())))
             assert len(rows) == (300 * 150 if title == "Stability map" else 200)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import signal
 import zlib
 
 import httpx
@@ -225,27 +224,6 @@ def test_a_job_is_cancelled_and_an_earlier_one_opened_again_and_kept_in_the_link
     again = opened(service, page.evaluate("location.hash")).page
     again.wait_for_selector(".response .plot .main-svg")
     assert again.inner_text(".verdict") == sentence
-
-
-def test_a_simulation_goes_on_over_a_restart_of_the_service_and_the_page_with_it(tmp_path, opened):
-    service = ServedProcess(tmp_path, free_port(), {"drain_s": "0"}).start()
-    try:
-        watched = opened(service, link())
-        watched.expected = ["ERR_", "Failed to fetch", "network error"]
-        page = watched.page
-        field(wear_form(page), "Speeds", "fieldset").fill("60")
-        page.get_by_role("button", name="Wear map round this speed").click()
-        page.wait_for_selector(".job .state:text-matches('of 60 speeds')")
-        service.tell(signal.SIGTERM)
-        service.ended()
-        page.wait_for_selector("#banner:visible")
-        service.start()
-        page.wait_for_selector("#banner:visible", state="detached", timeout=60_000)
-        page.wait_for_selector(".job .state:text-matches('^Done')", timeout=60_000)
-        page.wait_for_selector(".verdict:has-text('of 60 simulated speeds')", timeout=60_000)
-        assert field(wear_form(page), "Speeds", "fieldset").input_value() == "60"
-    finally:
-        service.kill()
 
 
 def test_a_key_that_may_only_read_sees_why_it_cannot_simulate(tmp_path, opened):
