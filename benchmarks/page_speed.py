@@ -29,6 +29,7 @@ MEASURES = {
     "exact boundary, at more speeds": "finer boundary on screen",
     "map re-verified": "verified map on screen",
 }
+# A hand on the slider: some sixteen changes a second.
 _DRAG = """async ([from, to, steps]) => {
   const slider = document.querySelector("[data-slider=damping]");
   for (let i = 0; i <= steps; i += 1) {

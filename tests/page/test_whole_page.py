@@ -67,6 +67,8 @@ def test_axe_finds_nothing_serious(service, opened, pictures, view, theme):
     page = opened(service, f"page/#view={view.lower()}", color_scheme=theme)
     if view == "Explorer":
         page.settled()
+    else:
+        page.until("document.querySelectorAll('.compare .halves tbody tr').length > 2")
     page.page.wait_for_timeout(800)
     page.page.screenshot(path=pictures / f"{view.lower().replace(' ', '_')}_{theme}.png", full_page=True)
     assert page.violations() == []

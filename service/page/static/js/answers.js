@@ -61,6 +61,7 @@ export const askBoundary = (question, signal) =>
 export class Answers extends EventTarget {
   #question = null;
   #since = 0;
+  #verified = -1;
   #drawing = false;
   #again = false;
   #timer = 0;
@@ -111,6 +112,8 @@ export class Answers extends EventTarget {
       try {
         const map = await askMap({ blade, contact, ...grid, policy: "surrogate" });
         this.#tell("outside", null);
+        // Where the surrogate was slower than what verifies it, the better map is on screen already.
+        if (this.#verified === since) continue;
         await new Promise((drawn) => this.#tell("map", { map, live: true, since, drawn }));
       } catch (error) {
         // Outside its domain the surrogate says so; what follows is exact then.
@@ -158,7 +161,11 @@ export class Answers extends EventTarget {
       await campbell;
       const grid = { speed_hz: evenly(...span, how.speeds), ke: evenly(0, range.ke_max, how.stiffnesses) };
       const map = askMap({ blade, contact, ...grid, policy: "auto" }, signal).then(
-        (found) => signal.aborted || this.#tell("map", { map: found, live: false, since, drawn: () => {} }),
+        (found) => {
+          if (signal.aborted) return;
+          this.#verified = since;
+          this.#tell("map", { map: found, live: false, since, drawn: () => {} });
+        },
       );
       const lobes = ask(
         "v1/lobes", { blade, contact, speed_range_hz: span, ke_max: range.ke_max, count: how.lobes }, { signal },

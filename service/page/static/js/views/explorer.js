@@ -41,6 +41,8 @@ export class ExplorerView {
     this.pointAgain = settled(120, () => this.shown && this.point.show(app.point));
     this.#connect();
     app.onChange((what) => this.#appChanged(what));
+    // What is said of the map is of the design before, if nobody answers for this one.
+    events.addEventListener("away", () => this.shown && this.findings.show({ map: null }));
     events.addEventListener("back", () => this.shown && this.#ask());
   }
 
@@ -81,7 +83,10 @@ export class ExplorerView {
     });
     answers.on("boundary", async ({ boundary, since, fine }) => {
       this.boundary = { ...boundary, ke_max: this.app.range.ke_max };
-      await map.show({ boundary: this.boundary, ...this.#frame() });
+      // A slow live map of the same design comes later at times, and is then no reason to take this away.
+      const stale = this.#moved ? { lobes: null } : {};
+      this.#moved = false;
+      await map.show({ boundary: this.boundary, ...this.#frame(), ...stale });
       measured(fine ? "finer boundary on screen" : "exact boundary on screen", since);
       this.findings.show({ boundary: this.boundary });
     });
@@ -167,7 +172,6 @@ export class ExplorerView {
 
   #ask() {
     const { active: design, range } = this.app;
-    this.#kept();
     // What is on screen is of the design before, until answers for this one come.
     for (const element of [this.map.element, this.campbell.element]) element.classList.add("stale");
     this.lobes.show(null);
