@@ -21,7 +21,7 @@ from rich.table import Table
 from benchmarks.jobs.service_process import ServiceProcess
 
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
-DRAGS, STEPS = 12, 15
+DRAGS, STEPS = 8, 20
 CONTACTS = {"permanent contact": "All round", "two arcs of contact": "Two quarters"}
 MEASURES = {
     "map of 120 × 120 by the surrogate": "map on screen",
