@@ -32,9 +32,12 @@ if CHROMIUM is None and os.environ.get("CI") != "true":
     collect_ignore_glob = ["test_*.py"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser():
-    """Chromium, once for every test of a worker."""
+    """Chromium, for the tests of a module.
+
+    No longer: Playwright keeps an event loop running in this thread, and tests of coroutines want their own.
+    """
     api = pytest.importorskip("playwright.sync_api")
     with api.sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
