@@ -148,7 +148,7 @@ def test_a_service_that_is_restarted_underneath_loses_nothing(tmp_path, opened, 
         assert "nasa-rotor-37 · TE" in page.text(".findings .design-title")
         served.start()
         page.until("document.querySelector('#banner').hidden", 60.0)
-        page.drawn()
+        page.settled()
         assert page.text(".findings .design-title") == "nasa-rotor-37 · TE · damping × 3.162"
         assert "✕ chatters" in page.text(".findings") or "✓ stable" in page.text(".findings")
     finally:
