@@ -106,7 +106,7 @@ def test_the_pointer_reads_verdict_growth_and_frequency(explorer):
     explorer.page.mouse.move(*point_of(explorer, 241.0, 20_000.0))
     explorer.until("document.querySelector('.reading').innerText.includes('exact core')")
     told = explorer.text("section.point")
-    assert "✕ unstable" in told and "+" in told
+    assert "✕ unstable" in told and "+" in told and "(mode 2)" in told
     assert figures(told)[0] == pytest.approx(241.0 * 60, rel=2e-3)
     # The other chart shows the same speed.
     assert not explorer.page.evaluate("[...document.querySelectorAll('.hair.vertical')][1].hidden")

@@ -47,7 +47,6 @@ def test_the_policy_is_strict_and_stands_on_every_file(service):
     for path in ("/page/", "/page/js/main.js", "/page/nothing.js"):
         reply = httpx.get(service.url + path, trust_env=False)
         assert reply.headers.get("content-security-policy") == POLICY or reply.status_code == 404
-    assert httpx.get(f"{service.url}/page/../v1/models", trust_env=False).status_code in (200, 404)
     assert httpx.get(f"{service.url}/", trust_env=False).headers["location"] == "page/"
 
 

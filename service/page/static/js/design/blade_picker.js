@@ -86,13 +86,11 @@ export class BladePicker {
     note(`Building ${profile.name} by finite elements, first from a coarse mesh…`);
     const { blade } = await ProfileShapes.build(ProfileShapes.coarseOf(profile));
     const design = new Design(blade, { profile });
-    design.coarse = true;
     this.onBlade(design);
     note("Shown from a coarse mesh; the mesh of the profile is being built…");
     const fine = await ProfileShapes.build(profile);
     if (this.app.active !== design) return fill(this.said);
     design.base = fine.blade;
-    design.coarse = false;
     fill(this.said);
     say(`${blade.name} built`);
     return this.onBlade(design);

@@ -23,7 +23,7 @@ export class ExplorerView {
     this.map = new MapChart();
     this.campbell = new CampbellChart();
     this.findings = new Findings(app, { onDamping: (factor) => this.#damp(factor), onSearch: () => this.answers.searchDamping() });
-    this.point = new PointReading(app, { clear: () => this.#choose(null) });
+    this.point = new PointReading(app, { clear: () => this.#choose(null), modesAt: (speed_hz) => this.campbell.frequenciesAt(speed_hz) });
     this.lobes = new LobeTable((index) => this.#chooseLobe(index));
     this.picker = new BladePicker(app, (design) => {
       if (design === app.active) return app.changed("design");

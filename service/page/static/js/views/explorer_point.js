@@ -13,10 +13,11 @@ const REASONS = {
 const REST = 70;
 
 export class PointReading {
-  /** @param {import("../app.js").App} app  @param {{clear: () => void}} does */
-  constructor(app, { clear }) {
+  /** @param {import("../app.js").App} app  @param {{clear: () => void, modesAt: (speed_hz: number) => number[]|null}} does */
+  constructor(app, { clear, modesAt }) {
     this.app = app;
     this.clear = clear;
+    this.modesAt = modesAt;
     this.place = h("h3", {}, "Point of the map");
     this.table = h("dl", { class: "reading" });
     this.hint = h("p", { class: "note" });
@@ -95,7 +96,7 @@ export class PointReading {
   }
 
   #mode(chatter, speed) {
-    const frequencies = this.modesAt?.(speed);
+    const frequencies = this.modesAt(speed);
     if (!frequencies) return "";
     const nearest = frequencies.reduce((best, f, j) => (Math.abs(Math.log(f / chatter)) < Math.abs(Math.log(frequencies[best] / chatter)) ? j : best), 0);
     return ` (mode ${nearest + 1})`;
